@@ -1,0 +1,110 @@
+!> One case as the user describes it: plain values in SI units and radians, one type per namelist group.
+!>
+!> Arrays are allocated to their full length (a single value in the namelist has been spread out already):
+!> rods and nodes count 1..n, hinges 0..n-1. Values have been checked one by one; what only a combination
+!> forbids is found by `new_scene`. Defaults stand in one place, the tables of `rodyn_case_schema`;
+!> the initial values here only serve library users who fill a case by hand.
+module rodyn_case_config
+   use rodyn_kinds, only: wp
+   implicit none (type, external)
+   private
+   public :: case_config, spacecraft_config, chain_config, model_config, initial_config, load_config, &
+      solver_config, output_config
+   public :: name_length
+
+   integer, parameter :: name_length = 32 !! longest choice word ('distributed', 'sine_squared', ...)
+
+   !> &spacecraft
+   type :: spacecraft_config
+      real(wp) :: mass = 0.0_wp    !! M0 [kg]
+      real(wp) :: inertia = 0.0_wp !! J0, about the centre of mass [kg m^2]
+      real(wp) :: hinge_x = 0.0_wp !! x0 of hinge 0, moving frame [m]
+      real(wp) :: hinge_y = 0.0_wp !! y0 of hinge 0, moving frame [m]
+      character(len=name_length) :: motion = 'free' !! 'free' or 'fixed'
+   end type spacecraft_config
+
+   !> &chain
+   type :: chain_config
+      integer :: n_rods = 0 !! n
+      real(wp), allocatable :: length(:)            !! l (1:n) [m]
+      real(wp), allocatable :: mass_per_length(:)   !! m (1:n) [kg/m]
+      real(wp), allocatable :: bending_stiffness(:) !! EI (1:n) [N m^2]; unused when bending is 'rigid'
+      real(wp), allocatable :: node_mass(:)         !! mu (1:n) [kg]
+      real(wp), allocatable :: hinge_stiffness(:)   !! C (0:n-1) [N m/rad]
+      real(wp), allocatable :: hinge_damping(:)     !! D (0:n-1) [N m s/rad]
+      real(wp), allocatable :: kink(:)              !! gamma (0:n-1) [rad]
+   end type chain_config
+
+   !> &model
+   type :: model_config
+      character(len=name_length) :: formulation = 'consistent' !! 'consistent' or 'paper'
+      character(len=name_length) :: inertia = 'distributed'    !! 'distributed' or 'lumped'
+      character(len=name_length) :: bending = 'dynamic'        !! 'dynamic', 'quasistatic' or 'rigid'
+      integer :: gauss_points = 4                              !! points of the rule for the rod integrals
+      character(len=name_length) :: kernel = 'recursive'       !! 'recursive' or 'assembled'
+   end type model_config
+
+   !> &initial
+   type :: initial_config
+      real(wp), allocatable :: phi(:)        !! chord angles (1:n) [rad]
+      real(wp), allocatable :: alpha(:)      !! inner end slopes (1:n) [rad]
+      real(wp), allocatable :: beta(:)       !! outer end slopes (1:n) [rad]
+      real(wp), allocatable :: phi_rate(:)   !! (1:n) [rad/s]
+      real(wp), allocatable :: alpha_rate(:) !! (1:n) [rad/s]
+      real(wp), allocatable :: beta_rate(:)  !! (1:n) [rad/s]
+      real(wp) :: velocity_x = 0.0_wp        !! Vx, moving frame [m/s]
+      real(wp) :: velocity_y = 0.0_wp        !! Vy, moving frame [m/s]
+      real(wp) :: omega = 0.0_wp             !! w [rad/s]
+      real(wp) :: displacement_x = 0.0_wp    !! u_x, moving frame [m]
+      real(wp) :: displacement_y = 0.0_wp    !! u_y, moving frame [m]
+      real(wp) :: rotation = 0.0_wp          !! theta [rad]
+   end type initial_config
+
+   !> One &load group
+   type :: load_config
+      character(len=name_length) :: target = 'spacecraft' !! 'spacecraft' or 'node'
+      integer :: node = 0                                 !! 1..n when target is 'node'
+      character(len=name_length) :: component = 'M'       !! 'X', 'Y' [N] or 'M' [N m], moving axes
+      character(len=name_length) :: law = 'constant'      !! 'constant', 'table', 'sine_squared', 'smooth_step'
+      real(wp) :: t_start = 0.0_wp                        !! [s]
+      real(wp) :: t_end = huge(1.0_wp)                    !! [s]; huge: never ends
+      real(wp) :: value = 0.0_wp                          !! amplitude [N] or [N m]
+      real(wp) :: rate = 0.0_wp                           !! of sine_squared [rad/s]
+      real(wp) :: rise_time = 0.0_wp                      !! of smooth_step [s]
+      real(wp), allocatable :: times(:)                   !! of table, increasing [s]
+      real(wp), allocatable :: values(:)                  !! of table [N] or [N m]
+   end type load_config
+
+   !> &solver
+   type :: solver_config
+      character(len=name_length) :: method = 'auto' !! 'auto', 'adams', 'bdf', 'erk'
+      real(wp) :: rtol = 1.0e-8_wp                  !! relative tolerance
+      real(wp) :: atol = 1.0e-10_wp                 !! absolute tolerance, all states
+      integer :: order = 0                          !! highest order; 0: the method's own choice
+      real(wp) :: max_step = 0.0_wp                 !! [s]; 0: no bound
+      real(wp) :: fixed_step = 0.0_wp               !! [s], 'erk' only; 0: adaptive
+      integer :: max_steps = 1000000000             !! steps of the whole run
+   end type solver_config
+
+   !> &output
+   type :: output_config
+      character(len=:), allocatable :: file !! path of the result; empty: named after the case
+      logical :: ledger = .true.            !! energy and momentum along the run
+      integer :: compression = 4            !! gzip level 0..9
+   end type output_config
+
+   !> A whole case
+   type :: case_config
+      character(len=:), allocatable :: title
+      real(wp) :: t_end = 1.0_wp  !! [s]
+      integer :: n_outputs = 1000 !! intervals; n_outputs + 1 rows
+      type(spacecraft_config) :: spacecraft
+      type(chain_config) :: chain
+      type(model_config) :: model
+      type(initial_config) :: initial
+      type(load_config), allocatable :: loads(:)
+      type(solver_config) :: solver
+      type(output_config) :: output
+   end type case_config
+
+end module rodyn_case_config
