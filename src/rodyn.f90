@@ -1,0 +1,6 @@
+module rodyn
+   use rodyn_kinds, only: wp
+   implicit none (type, external)
+   private
+   public :: wp
+end module rodyn

@@ -1,0 +1,134 @@
+!> A small test harness: a suite is a list of named tests; a test fails by raising an error.
+module test_testing
+   use, intrinsic :: iso_fortran_env, only: output_unit
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+   use rodyn_kinds, only: wp
+   use rodyn_errors, only: error_type, raise
+   implicit none (type, external)
+   private
+   public :: unittest, new_test, suite_tally, run_suite, check, check_close
+
+   abstract interface
+      subroutine test_interface(error)
+         import :: error_type
+         implicit none (type, external)
+         type(error_type), allocatable, intent(out) :: error !! allocated: the test failed
+      end subroutine test_interface
+   end interface
+
+   type :: unittest
+      character(len=:), allocatable :: name !! a sentence that says what holds
+      procedure(test_interface), pointer, nopass :: test => null()
+   end type unittest
+
+   type :: suite_tally
+      integer :: passed = 0
+      integer :: failed = 0
+   end type suite_tally
+
+   !> Fail unless a condition holds.
+   interface check
+      module procedure check_condition
+      module procedure check_integer
+      module procedure check_text
+   end interface check
+
+   !> Fail unless |actual - expected| <= tolerance everywhere; NaN always fails.
+   interface check_close
+      module procedure check_close_scalar
+      module procedure check_close_array
+   end interface check_close
+
+contains
+
+   !> One entry of a suite.
+   function new_test(name, test) result(entry)
+      character(len=*), intent(in) :: name
+      procedure(test_interface) :: test
+      type(unittest) :: entry
+      entry%name = name
+      entry%test => test
+   end function new_test
+
+   !> Run the tests of a suite whose name contains `filter`, print each, and add to the tally.
+   subroutine run_suite(suite_name, suite, tally, filter)
+      character(len=*), intent(in) :: suite_name
+      type(unittest), intent(in) :: suite(:)
+      type(suite_tally), intent(inout) :: tally
+      character(len=*), intent(in) :: filter !! empty: all
+      type(error_type), allocatable :: error
+      integer :: i
+
+      do i = 1, size(suite)
+         if (len(filter) > 0 .and. index(suite(i)%name, filter) == 0) cycle
+         call suite(i)%test(error)
+         if (allocated(error)) then
+            tally%failed = tally%failed + 1
+            write (output_unit, '(a)') 'FAILED '//suite_name//': '//suite(i)%name
+            write (output_unit, '(a)') '       '//error%message
+         else
+            tally%passed = tally%passed + 1
+            write (output_unit, '(a)') 'passed '//suite_name//': '//suite(i)%name
+         end if
+         flush (output_unit)
+      end do
+   end subroutine run_suite
+
+   subroutine check_condition(error, condition, message)
+      type(error_type), allocatable, intent(out) :: error
+      logical, intent(in) :: condition
+      character(len=*), intent(in) :: message
+      if (.not. condition) call raise(error, message)
+   end subroutine check_condition
+
+   subroutine check_integer(error, actual, expected, message)
+      type(error_type), allocatable, intent(out) :: error
+      integer, intent(in) :: actual, expected
+      character(len=*), intent(in) :: message
+      character(len=80) :: numbers
+      if (actual == expected) return
+      write (numbers, '(": ", i0, " instead of ", i0)') actual, expected
+      call raise(error, message//trim(numbers))
+   end subroutine check_integer
+
+   subroutine check_text(error, actual, expected, message)
+      type(error_type), allocatable, intent(out) :: error
+      character(len=*), intent(in) :: actual, expected
+      character(len=*), intent(in) :: message
+      if (actual == expected .and. len(actual) == len(expected)) return
+      call raise(error, message//': "'//actual//'" instead of "'//expected//'"')
+   end subroutine check_text
+
+   subroutine check_close_scalar(error, actual, expected, tolerance, message)
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), intent(in) :: actual, expected
+      real(wp), intent(in) :: tolerance !! absolute
+      character(len=*), intent(in) :: message
+      call check_close_array(error, [actual], [expected], tolerance, message)
+   end subroutine check_close_scalar
+
+   subroutine check_close_array(error, actual, expected, tolerance, message)
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), intent(in) :: actual(:), expected(:)
+      real(wp), intent(in) :: tolerance !! absolute
+      character(len=*), intent(in) :: message
+      character(len=200) :: numbers
+      integer :: i
+
+      if (size(actual) /= size(expected)) then
+         write (numbers, '(": ", i0, " values instead of ", i0)') size(actual), size(expected)
+         call raise(error, message//trim(numbers))
+         return
+      end if
+      do i = 1, size(actual)
+         if (ieee_is_finite(actual(i))) then
+            if (abs(actual(i) - expected(i)) <= tolerance) cycle
+         end if
+         write (numbers, '(": value ", i0, " is ", es23.16, " instead of ", es23.16, ", difference ", es9.2, " > ", es9.2)') &
+            i, actual(i), expected(i), actual(i) - expected(i), tolerance
+         call raise(error, message//trim(numbers))
+         return
+      end do
+   end subroutine check_close_array
+
+end module test_testing
