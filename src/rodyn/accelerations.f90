@@ -1,0 +1,101 @@
+!> p' of a scene at a time and state: the kernel and the parts of it that the scene needs, chosen once.
+module rodyn_accelerations
+   use rodyn_kinds, only: wp
+   use rodyn_errors, only: error_type
+   use rodyn_scene, only: scene_type
+   use rodyn_workspace, only: workspace_type, new_workspace
+   use rodyn_trigonometry, only: sine_cosine
+   use rodyn_hinge_law, only: hinge_moments
+   use rodyn_loads, only: load_regime, load_forces, new_load_regime, evaluate_loads
+   use rodyn_recursion_flexible, only: flexible_accelerations
+   use rodyn_recursion_rigid, only: rigid_accelerations
+   use rodyn_recursion_lumped, only: lumped_accelerations
+   use rodyn_assembled, only: assembled_system, new_assembled_system, assembled_accelerations
+   implicit none (type, external)
+   private
+   public :: dynamics_type, new_dynamics
+
+   integer, parameter :: path_flexible = 1, path_rigid = 2, path_lumped = 3, path_assembled = 4
+
+   !> A scene with its memory and the loads that act now. One per thread.
+   type :: dynamics_type
+      type(scene_type) :: scene
+      type(workspace_type) :: work
+      type(assembled_system) :: system !! for the assembled kernel only
+      type(load_regime) :: regime      !! loads between the last switch and the next
+      type(load_forces) :: forces      !! their values
+      integer :: path = path_flexible  !! which kernel
+      logical :: varying = .false.     !! some load changes within the regime
+   contains
+      procedure :: set_regime
+      procedure :: accelerations
+   end type dynamics_type
+
+contains
+
+   !> Choose the kernel and allocate its memory. No loads act until `set_regime`.
+   subroutine new_dynamics(dynamics, scene, error)
+      type(dynamics_type), intent(out) :: dynamics
+      type(scene_type), intent(in) :: scene
+      type(error_type), allocatable, intent(out) :: error
+
+      dynamics%scene = scene
+      call new_workspace(dynamics%work, scene)
+      allocate (dynamics%forces%node(2, 0))
+      if (scene%assembled) then
+         dynamics%path = path_assembled
+         call new_assembled_system(dynamics%system, scene, error)
+      else if (scene%lumped) then
+         dynamics%path = path_lumped
+      else if (scene%dynamic_bending) then
+         dynamics%path = path_flexible
+      else
+         dynamics%path = path_rigid
+      end if
+   end subroutine new_dynamics
+
+   !> Make the loads between two neighbouring switch times act.
+   subroutine set_regime(self, t_from, t_to)
+      class(dynamics_type), intent(inout) :: self
+      real(wp), intent(in) :: t_from, t_to !! [s]
+
+      call new_load_regime(self%regime, self%scene%loads, t_from, t_to, self%scene%n)
+      call evaluate_loads(self%forces, self%regime, t_from, fresh=.true.)
+      self%varying = size(self%regime%varying) > 0
+   end subroutine set_regime
+
+   !> p' for given coordinates and rates. Allocates nothing.
+   subroutine accelerations(self, t, q, p, acceleration, ok)
+      class(dynamics_type), intent(inout) :: self
+      real(wp), intent(in) :: t                !! [s], within the regime
+      real(wp), contiguous, intent(in) :: q(:)             !! coordinates (dof)
+      real(wp), contiguous, intent(in) :: p(:)             !! rates (dof)
+      real(wp), contiguous, intent(out) :: acceleration(:) !! p' (dof)
+      logical, intent(out) :: ok               !! false: not finite, or M not positive definite
+
+      associate (scene => self%scene, work => self%work, first => self%scene%n_base + 1)
+         if (self%varying) call evaluate_loads(self%forces, self%regime, t, fresh=.false.)
+         call sine_cosine(scene%n, q(first:), work%sine(1:), work%cosine(1:))
+         if (self%path /= path_assembled) &
+            call hinge_moments(scene%hinges, scene%n, scene%dynamic_bending, q(first:), p(first:), work%theta, work%moment)
+         select case (self%path)
+         case (path_flexible)
+            call flexible_accelerations(scene%n, scene%n_base, scene%rods, scene%rod_of, scene%node_mass, scene%body, &
+                                        work%sine, work%cosine, q, p, work%moment, self%forces%base, &
+                                        self%regime%on_nodes, self%forces%node, work%outward, acceleration, ok)
+         case (path_rigid)
+            call rigid_accelerations(scene%n, scene%n_base, scene%rods, scene%rod_of, scene%node_mass, scene%body, &
+                                     work%sine, work%cosine, p, work%moment, self%forces%base, &
+                                     self%regime%on_nodes, self%forces%node, work%outward, acceleration, ok)
+         case (path_lumped)
+            call lumped_accelerations(scene%n, scene%n_base, scene%rods, scene%rod_of, scene%node_mass, scene%body, &
+                                      work%sine, work%cosine, p, work%moment, self%forces%base, &
+                                      self%regime%on_nodes, self%forces%node, work%outward, acceleration, ok)
+         case default
+            call assembled_accelerations(self%system, scene, work%sine, work%cosine, q, p, self%forces%base, &
+                                         self%regime%on_nodes, self%forces%node, acceleration, ok)
+         end select
+      end associate
+   end subroutine accelerations
+
+end module rodyn_accelerations

@@ -1,0 +1,150 @@
+!> Moments of the visco-elastic hinges, MODEL sec. 1, 2 and 5.
+!>
+!> With joint rotation th and its rate, T = C th + D th'. When bending is quasistatic the rods are springs in
+!> series with the hinges, and the joint rotations follow from one constant tridiagonal system (see
+!> `rodyn_three_moments`).
+module rodyn_hinge_law
+   use rodyn_kinds, only: wp
+   use rodyn_case_config, only: chain_config
+   use rodyn_three_moments, only: three_moments, new_three_moments
+   implicit none (type, external)
+   private
+   public :: hinge_law, new_hinge_law, hinge_moments, hinge_state, hinge_tangent
+
+   !> Springs, dampers and kinks of hinges 0..n-1.
+   type :: hinge_law
+      integer :: n = 0 !! hinges
+      real(wp), allocatable :: stiffness(:) !! C (0:n-1) [N m/rad]
+      real(wp), allocatable :: damping(:)   !! D (0:n-1) [N m s/rad]
+      real(wp), allocatable :: kink(:)      !! gamma (0:n-1) [rad]
+      logical :: has_damping = .false.      !! some D > 0
+      logical :: has_kinks = .false.        !! some gamma /= 0
+      logical :: quasistatic = .false.      !! rods bend without inertia
+      type(three_moments) :: series         !! hinges and rods in series, when quasistatic
+   end type hinge_law
+
+contains
+
+   !> Take over the hinges of a chain; factor the three-moment equation if bending is quasistatic.
+   subroutine new_hinge_law(law, chain, quasistatic)
+      type(hinge_law), intent(out) :: law
+      type(chain_config), intent(in) :: chain
+      logical, intent(in) :: quasistatic
+
+      law%n = chain%n_rods
+      allocate (law%stiffness(0:law%n - 1), law%damping(0:law%n - 1), law%kink(0:law%n - 1))
+      law%stiffness(:) = chain%hinge_stiffness
+      law%damping(:) = chain%hinge_damping
+      law%kink(:) = chain%kink
+      law%has_damping = any(law%damping > 0.0_wp)
+      law%has_kinks = any(law%kink /= 0.0_wp)
+      law%quasistatic = quasistatic
+      if (quasistatic) call new_three_moments(law%series, law%stiffness, chain%length/(6.0_wp*chain%bending_stiffness))
+   end subroutine new_hinge_law
+
+   !> Hinge moments T(0:n); T(n) = 0 at the free end. The opening of hinge k is phi_{k+1} - phi_k (rigid or
+   !> quasistatic rods) or (phi + alpha)_{k+1} - (phi + beta)_k (dynamic bending), phi_0 = beta_0 = 0.
+   pure subroutine hinge_moments(law, n, flexible, angle, angle_rate, theta, moment)
+      type(hinge_law), intent(in) :: law
+      integer, intent(in) :: n
+      logical, intent(in) :: flexible !! angle and rate hold alpha and beta behind phi
+      real(wp), intent(in) :: angle(*)      !! phi(n) [, alpha(n), beta(n)] [rad]
+      real(wp), intent(in) :: angle_rate(*) !! their rates [rad/s]
+      real(wp), intent(inout) :: theta(0:n - 1) !! workspace
+      real(wp), intent(out) :: moment(0:n)  !! T [N m]
+
+      if (law%quasistatic) then
+         call series_moments(law, n, angle, angle_rate, theta, moment)
+         return
+      end if
+      call openings(n, flexible, angle, theta)
+      if (law%has_kinks) theta = theta - law%kink
+      moment(0:n - 1) = law%stiffness*theta
+      moment(n) = 0.0_wp
+      if (.not. law%has_damping) return
+      call openings(n, flexible, angle_rate, theta)
+      moment(0:n - 1) = moment(0:n - 1) + law%damping*theta
+   end subroutine hinge_moments
+
+   !> Opening of each hinge, without its kink; the same map takes rates to rates.
+   pure subroutine openings(n, flexible, angle, opening)
+      integer, intent(in) :: n
+      logical, intent(in) :: flexible
+      real(wp), intent(in) :: angle(*)
+      real(wp), intent(out) :: opening(0:n - 1)
+      integer :: k
+
+      if (flexible) then
+         opening(0) = angle(1) + angle(n + 1)
+         do k = 1, n - 1
+            opening(k) = (angle(k + 1) + angle(n + k + 1)) - (angle(k) + angle(2*n + k))
+         end do
+      else
+         opening(0) = angle(1)
+         do k = 1, n - 1
+            opening(k) = angle(k + 1) - angle(k)
+         end do
+      end if
+   end subroutine openings
+
+   !> Quasistatic bending: th = G (opening - gamma), T = C th + G^T D G opening', G of the three-moment equation.
+   !> The damping term is what Rayleigh's function sum D (G opening')^2 / 2 gives, so energy balances exactly.
+   pure subroutine series_moments(law, n, angle, angle_rate, theta, moment)
+      type(hinge_law), intent(in) :: law
+      integer, intent(in) :: n
+      real(wp), intent(in) :: angle(*), angle_rate(*)
+      real(wp), intent(inout) :: theta(0:n - 1)
+      real(wp), intent(out) :: moment(0:n)
+
+      call openings(n, .false., angle, theta)
+      if (law%has_kinks) theta = theta - law%kink
+      call law%series%solve(theta)
+      moment(0:n - 1) = law%stiffness*theta
+      moment(n) = 0.0_wp
+      if (.not. law%has_damping) return
+      call openings(n, .false., angle_rate, theta)
+      call law%series%solve(theta)
+      theta = law%damping*theta
+      call law%series%solve_transposed(theta)
+      moment(0:n - 1) = moment(0:n - 1) + theta
+   end subroutine series_moments
+
+   !> Joint rotations th and their rates, for output and ledger.
+   pure subroutine hinge_state(law, n, flexible, angle, angle_rate, theta, theta_rate)
+      type(hinge_law), intent(in) :: law
+      integer, intent(in) :: n
+      logical, intent(in) :: flexible
+      real(wp), intent(in) :: angle(*), angle_rate(*)
+      real(wp), intent(out) :: theta(0:n - 1)      !! th [rad]
+      real(wp), intent(out) :: theta_rate(0:n - 1) !! th' [rad/s]
+
+      call openings(n, flexible, angle, theta)
+      theta = theta - law%kink
+      call openings(n, flexible, angle_rate, theta_rate)
+      if (.not. law%quasistatic) return
+      call law%series%solve(theta)
+      call law%series%solve(theta_rate)
+   end subroutine hinge_state
+
+   !> Change of the hinge moments for a change of angles and rates (the law is linear but for the kinks).
+   pure subroutine hinge_tangent(law, n, flexible, d_angle, d_angle_rate, work, d_moment)
+      type(hinge_law), intent(in) :: law
+      integer, intent(in) :: n
+      logical, intent(in) :: flexible
+      real(wp), intent(in) :: d_angle(*), d_angle_rate(*)
+      real(wp), intent(inout) :: work(0:n - 1)
+      real(wp), intent(out) :: d_moment(0:n)
+
+      call openings(n, flexible, d_angle, work)
+      if (law%quasistatic) call law%series%solve(work)
+      d_moment(0:n - 1) = law%stiffness*work
+      d_moment(n) = 0.0_wp
+      if (.not. law%has_damping) return
+      call openings(n, flexible, d_angle_rate, work)
+      if (law%quasistatic) call law%series%solve(work)
+      work = law%damping*work
+      if (law%quasistatic) call law%series%solve_transposed(work)
+      d_moment(0:n - 1) = d_moment(0:n - 1) + work
+   end subroutine hinge_tangent
+
+end module rodyn_hinge_law

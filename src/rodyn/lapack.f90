@@ -1,0 +1,66 @@
+!> The LAPACK and BLAS routines in use, with their interfaces; the only module that names them.
+module rodyn_lapack
+   use rodyn_kinds, only: wp
+   implicit none (type, external)
+   private
+   public :: dpotrf, dpotrs, dgesv, dsygvd, dgemv
+
+   interface
+      !> Cholesky factors of a symmetric positive definite matrix.
+      pure subroutine dpotrf(uplo, n, a, lda, info)
+         import :: wp
+         implicit none (type, external)
+         character(len=1), intent(in) :: uplo
+         integer, intent(in) :: n, lda
+         real(wp), intent(inout) :: a(lda, *)
+         integer, intent(out) :: info
+      end subroutine dpotrf
+
+      !> Solve with the factors of dpotrf.
+      pure subroutine dpotrs(uplo, n, nrhs, a, lda, b, ldb, info)
+         import :: wp
+         implicit none (type, external)
+         character(len=1), intent(in) :: uplo
+         integer, intent(in) :: n, nrhs, lda, ldb
+         real(wp), intent(in) :: a(lda, *)
+         real(wp), intent(inout) :: b(ldb, *)
+         integer, intent(out) :: info
+      end subroutine dpotrs
+
+      !> Solve a general system by LU with pivoting.
+      pure subroutine dgesv(n, nrhs, a, lda, ipiv, b, ldb, info)
+         import :: wp
+         implicit none (type, external)
+         integer, intent(in) :: n, nrhs, lda, ldb
+         real(wp), intent(inout) :: a(lda, *)
+         integer, intent(out) :: ipiv(*)
+         real(wp), intent(inout) :: b(ldb, *)
+         integer, intent(out) :: info
+      end subroutine dgesv
+
+      !> Eigenvalues (ascending) and vectors of A x = lambda B x, A symmetric, B positive definite.
+      pure subroutine dsygvd(itype, jobz, uplo, n, a, lda, b, ldb, w, work, lwork, iwork, liwork, info)
+         import :: wp
+         implicit none (type, external)
+         integer, intent(in) :: itype, n, lda, ldb, lwork, liwork
+         character(len=1), intent(in) :: jobz, uplo
+         real(wp), intent(inout) :: a(lda, *), b(ldb, *)
+         real(wp), intent(out) :: w(*)
+         real(wp), intent(inout) :: work(*)
+         integer, intent(inout) :: iwork(*)
+         integer, intent(out) :: info
+      end subroutine dsygvd
+
+      !> y <- alpha A x + beta y.
+      pure subroutine dgemv(trans, m, n, alpha, a, lda, x, incx, beta, y, incy)
+         import :: wp
+         implicit none (type, external)
+         character(len=1), intent(in) :: trans
+         integer, intent(in) :: m, n, lda, incx, incy
+         real(wp), intent(in) :: alpha, beta
+         real(wp), intent(in) :: a(lda, *), x(*)
+         real(wp), intent(inout) :: y(*)
+      end subroutine dgemv
+   end interface
+
+end module rodyn_lapack

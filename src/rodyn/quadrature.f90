@@ -1,0 +1,63 @@
+!> Gauss-Legendre quadrature of any order.
+module rodyn_quadrature
+   use rodyn_kinds, only: wp
+   implicit none (type, external)
+   private
+   public :: gauss_rule, new_gauss_rule
+
+   !> Points and weights on [0, 1]; exact for polynomials up to degree 2 n - 1.
+   type :: gauss_rule
+      real(wp), allocatable :: points(:)  !! abscissae, increasing (n)
+      real(wp), allocatable :: weights(:) !! positive, sum 1 (n)
+   end type gauss_rule
+
+   real(wp), parameter :: pi = acos(-1.0_wp)
+
+contains
+
+   !> The rule of `n_points` >= 1 points: the roots of the Legendre polynomial P_n by Newton's method from
+   !> Tricomi's estimate (Abramowitz & Stegun 22.16.6, 25.4.29), one half by symmetry.
+   pure subroutine new_gauss_rule(rule, n_points)
+      type(gauss_rule), intent(out) :: rule
+      integer, intent(in) :: n_points !! >= 1
+      real(wp) :: x, step, value, slope
+      integer :: i, n
+
+      n = n_points
+      allocate (rule%points(n), rule%weights(n))
+      do i = 1, (n + 1)/2
+         x = cos(pi*(i - 0.25_wp)/(n + 0.5_wp))
+         if (2*i == n + 1) x = 0.0_wp
+         do ! quadratic convergence: the step after one below sqrt(epsilon) is at rounding level
+            call legendre(n, x, value, slope)
+            step = value/slope
+            x = x - step
+            if (abs(step) < sqrt(epsilon(x))) exit
+         end do
+         call legendre(n, x, value, slope)
+         rule%points(i) = 0.5_wp*(1.0_wp - x)
+         rule%points(n + 1 - i) = 0.5_wp*(1.0_wp + x)
+         rule%weights(i) = 1.0_wp/((1.0_wp - x*x)*slope**2)
+         rule%weights(n + 1 - i) = rule%weights(i)
+      end do
+   end subroutine new_gauss_rule
+
+   !> P_n(x) and P_n'(x) by the three-term recurrence, |x| < 1.
+   pure subroutine legendre(n, x, value, slope)
+      integer, intent(in) :: n
+      real(wp), intent(in) :: x
+      real(wp), intent(out) :: value, slope
+      real(wp) :: before, older
+      integer :: j
+
+      value = 1.0_wp
+      before = 0.0_wp
+      do j = 1, n
+         older = before
+         before = value
+         value = ((2*j - 1)*x*before - (j - 1)*older)/j
+      end do
+      slope = n*(before - x*value)/(1.0_wp - x*x)
+   end subroutine legendre
+
+end module rodyn_quadrature

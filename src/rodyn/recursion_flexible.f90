@@ -1,0 +1,156 @@
+!> Accelerations of a chain of flexible rods in O(n), MODEL sec. 3 and 4.2.
+!>
+!> Seen from its inner node, the chain from rod k outward is an apparent mass P (2x2, symmetric) and a bias
+!> force b:  f = P A + b  with A the acceleration of the node. From the tip inward, rod k is added by
+!> eliminating first alpha'', beta'' (constant block B, done at compile time: `reduced` inertias) and then W':
+!>     D W' + Ce Ae + Cn An = R,  D = d + l^2 pnn,  Ce = l pen - int m v,  Cn = m1 + l pnn,
+!> where Ae, An are the components of A along and across the rod and pee, pen, pnn those of P at its outer node.
+!>
+!> Written as Schur complements (pnn - Cn^2/D, ...) the new P loses as many digits as the outboard mass exceeds
+!> the rod's. Here the products are multiplied out, so that the large terms cancel on paper; the determinant of
+!> P, which does not depend on the axes, is carried along for the one difference (pee pnn - pen^2) that is left.
+module rodyn_recursion_flexible
+   use rodyn_kinds, only: wp
+   use rodyn_rod_constants, only: rod_constants
+   use rodyn_spacecraft, only: spacecraft_body, spacecraft_accelerations
+   implicit none (type, external)
+   private
+   public :: flexible_accelerations
+
+contains
+
+   !> p' = (Vx', Vy', w', phi'', alpha'', beta'') for given q, p, hinge moments and loads.
+   pure subroutine flexible_accelerations(n, n_base, rods, rod_of, node_mass, body, sine, cosine, q, p, moment, &
+                                          base_force, loaded, node_force, outward, acceleration, ok)
+      integer, intent(in) :: n, n_base              !! rods; 3 or 0 unknowns of the spacecraft
+      type(rod_constants), intent(in) :: rods(*)    !! distinct rods
+      integer, intent(in) :: rod_of(n)              !! which of them is rod k
+      real(wp), intent(in) :: node_mass(0:n)        !! mu [kg]
+      type(spacecraft_body), intent(in) :: body     !! mass, inertia, hinge 0
+      real(wp), intent(in) :: sine(0:n), cosine(0:n) !! of phi; 0 and 1 at k = 0
+      real(wp), intent(in) :: q(n_base + 3*n)       !! coordinates
+      real(wp), intent(in) :: p(n_base + 3*n)       !! rates
+      real(wp), intent(in) :: moment(0:n)           !! hinge moments T, T(n) = 0 [N m]
+      real(wp), intent(in) :: base_force(3)         !! X_C, Y_C, M_C, moving axes
+      logical, intent(in) :: loaded                 !! node_force is to be used
+      real(wp), intent(in) :: node_force(2, *)      !! X, Y at nodes (n), moving axes [N]
+      real(wp), intent(out) :: outward(8, n)        !! workspace
+      real(wp), intent(out) :: acceleration(n_base + 3*n) !! p'
+      logical, intent(out) :: ok                    !! false: not finite
+
+      integer :: k, ip, ia, ib
+      real(wp) :: omega, omega_rate, w, w2, lw2, w_rate, alpha, beta, qa, qb
+      real(wp) :: mv, mv_rate, mvv, mvv_rate, d, outer, central, r0, gq, hq
+      real(wp) :: pee, pen, pnn, det, be, bn, mu, inv, ce, cn, r, ee, en, nn, cd, sd, ae, an
+
+      ip = n_base
+      ia = n_base + n
+      ib = n_base + 2*n
+      omega = 0.0_wp
+      if (n_base > 0) omega = p(3)
+      pee = 0.0_wp
+      pen = 0.0_wp
+      pnn = 0.0_wp
+      det = 0.0_wp
+      be = 0.0_wp
+      bn = 0.0_wp
+
+      inward: do k = n, 1, -1
+         associate (rod => rods(rod_of(k)), i => rods(rod_of(k))%inertia)
+            ! The node at the outer end: P and b in the axes of rod k.
+            mu = node_mass(k)
+            det = det + mu*(pee + pnn + mu)
+            pee = pee + mu
+            pnn = pnn + mu
+            if (loaded) then
+               be = be - (node_force(1, k)*cosine(k) + node_force(2, k)*sine(k))
+               bn = bn - (node_force(2, k)*cosine(k) - node_force(1, k)*sine(k))
+            end if
+
+            ! Deflection: int m v, its rate, int m v^2 and int m v v'.
+            alpha = q(ia + k)
+            beta = q(ib + k)
+            w = omega + p(ip + k)
+            w2 = w*w
+            lw2 = rod%length*w2
+            mv = i%a1*alpha + i%b1*beta
+            mv_rate = i%a1*p(ia + k) + i%b1*p(ib + k)
+            qa = rod%second(1)*alpha + rod%second(2)*beta
+            qb = rod%second(2)*alpha + rod%second(3)*beta
+            mvv = alpha*qa + beta*qb
+            mvv_rate = p(ia + k)*qa + p(ib + k)*qb
+
+            ! Moments on the slopes; the centrifugal part W^2 B (alpha, beta) leaves B^-1 as W^2 (alpha, beta).
+            qa = -moment(k - 1) - rod%kappa*(2.0_wp*alpha + beta)
+            qb = moment(k) - rod%kappa*(alpha + 2.0_wp*beta)
+            gq = rod%g(1)*qa + rod%g(2)*qb
+            hq = rod%h(1)*qa + rod%h(2)*qb
+            r0 = moment(k) - moment(k - 1) - hq - w2*(i%sa*alpha + i%sb*beta) - 2.0_wp*w*mvv_rate
+            outward(4, k) = w2*alpha + rod%b_inverse(1)*qa + rod%b_inverse(2)*qb
+            outward(5, k) = w2*beta + rod%b_inverse(2)*qa + rod%b_inverse(3)*qb
+
+            ! Row of W'.
+            d = rod%m2_reduced + mvv
+            outer = rod%outer + mvv
+            central = rod%central + rod%m0_reduced*mvv
+            inv = 1.0_wp/(d + rod%length**2*pnn)
+            ce = rod%length*pen - mv
+            cn = rod%m1_reduced + rod%length*pnn
+            be = be - pee*lw2
+            bn = bn - pen*lw2
+            r = (r0 - rod%length*bn)*inv
+            outward(1, k) = r
+            outward(2, k) = ce*inv
+            outward(3, k) = cn*inv
+            outward(6, k) = lw2
+
+            ! The chain seen from the inner node, in the axes of rod k.
+            be = be - w2*i%m1 - 2.0_wp*w*mv_rate + ce*r
+            bn = (bn*(d - rod%length*rod%m1_reduced) + cn*r0)*inv + gq
+            nn = central + pnn*outer
+            ee = pee*d + rod%length**2*det + mv*(2.0_wp*rod%length*pen - mv)
+            en = pen*(d - rod%length*rod%m1_reduced) + mv*cn
+            det = (i%m0*nn + pee*central + det*outer + &
+                   mv*(2.0_wp*pen*(rod%length*rod%m0_reduced - rod%m1_reduced) - (rod%m0_reduced + pnn)*mv))*inv
+            ee = i%m0 + ee*inv
+            en = en*inv
+            nn = nn*inv
+         end associate
+
+         ! Turn to the axes of rod k - 1 (of the spacecraft for k = 1).
+         cd = cosine(k)*cosine(k - 1) + sine(k)*sine(k - 1)
+         sd = sine(k)*cosine(k - 1) - cosine(k)*sine(k - 1)
+         outward(7, k) = cd
+         outward(8, k) = sd
+         pee = cd*cd*ee + sd*(sd*nn - 2.0_wp*cd*en)
+         pnn = cd*cd*nn + sd*(sd*ee + 2.0_wp*cd*en)
+         pen = cd*sd*(ee - nn) + (cd - sd)*(cd + sd)*en
+         r = cd*be - sd*bn
+         bn = sd*be + cd*bn
+         be = r
+      end do inward
+
+      call spacecraft_accelerations(n_base, body, p, node_mass(0), pee, pen, pnn, be, bn, moment(0), base_force, &
+                                    acceleration, ae, an)
+      omega_rate = 0.0_wp
+      if (n_base > 0) omega_rate = acceleration(3)
+
+      do k = 1, n
+         associate (g => rods(rod_of(k))%g, h => rods(rod_of(k))%h, length => rods(rod_of(k))%length)
+            cd = outward(7, k)
+            sd = outward(8, k)
+            r = cd*ae + sd*an
+            an = cd*an - sd*ae
+            ae = r
+            w_rate = outward(1, k) - outward(2, k)*ae - outward(3, k)*an
+            acceleration(ip + k) = w_rate - omega_rate
+            acceleration(ia + k) = outward(4, k) - g(1)*an - h(1)*w_rate
+            acceleration(ib + k) = outward(5, k) - g(2)*an - h(2)*w_rate
+            ae = ae - outward(6, k)
+            an = an + length*w_rate
+         end associate
+      end do
+      ok = abs(an) <= huge(an)
+   end subroutine flexible_accelerations
+
+end module rodyn_recursion_flexible

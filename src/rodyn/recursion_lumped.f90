@@ -1,0 +1,93 @@
+!> Accelerations of a chain of massless rods between point masses in O(n), MODEL sec. 5 (`lumped`).
+!>
+!> A massless rod pulls and pushes only along itself, apart from the couple T_k - T_{k-1}: seen from its inner
+!> node, the chain from rod k outward is  f = a Ae e + b  with one axial apparent mass
+!>     a = mu (mu + a_out)/(mu + a_out sin^2(delta)),
+!> delta the angle from rod k to rod k + 1 and mu the mass between them: no differences, no loss of digits.
+module rodyn_recursion_lumped
+   use rodyn_kinds, only: wp
+   use rodyn_rod_constants, only: rod_constants
+   use rodyn_spacecraft, only: spacecraft_body, spacecraft_accelerations
+   implicit none (type, external)
+   private
+   public :: lumped_accelerations
+
+contains
+
+   !> p' = (Vx', Vy', w', phi'') for given rates, hinge moments and loads.
+   pure subroutine lumped_accelerations(n, n_base, rods, rod_of, node_mass, body, sine, cosine, p, moment, &
+                                        base_force, loaded, node_force, outward, acceleration, ok)
+      integer, intent(in) :: n, n_base              !! rods; 3 or 0 unknowns of the spacecraft
+      type(rod_constants), intent(in) :: rods(*)    !! distinct rods; only their lengths matter
+      integer, intent(in) :: rod_of(n)              !! which of them is rod k
+      real(wp), intent(in) :: node_mass(0:n)        !! node and half-rod masses, positive for k >= 1 [kg]
+      type(spacecraft_body), intent(in) :: body     !! mass, inertia, hinge 0
+      real(wp), intent(in) :: sine(0:n), cosine(0:n) !! of phi; 0 and 1 at k = 0
+      real(wp), intent(in) :: p(n_base + n)         !! rates
+      real(wp), intent(in) :: moment(0:n)           !! hinge moments T, T(n) = 0 [N m]
+      real(wp), intent(in) :: base_force(3)         !! X_C, Y_C, M_C, moving axes
+      logical, intent(in) :: loaded                 !! node_force is to be used
+      real(wp), intent(in) :: node_force(2, *)      !! X, Y at nodes (n), moving axes [N]
+      real(wp), intent(out) :: outward(8, n)        !! workspace
+      real(wp), intent(out) :: acceleration(n_base + n) !! p'
+      logical, intent(out) :: ok                    !! false: not finite
+
+      integer :: k
+      real(wp) :: omega, omega_rate, lw2, a, be, bn, mu, inv, shear, ratio, cd, sd, ae, an, outer_an, r
+
+      omega = 0.0_wp
+      if (n_base > 0) omega = p(3)
+      a = 0.0_wp
+      be = 0.0_wp
+      bn = 0.0_wp
+      cd = 1.0_wp ! of the angle from rod k to rod k + 1
+      sd = 0.0_wp
+
+      inward: do k = n, 1, -1
+         associate (length => rods(rod_of(k))%length)
+            mu = node_mass(k)
+            if (loaded) then
+               be = be - (node_force(1, k)*cosine(k) + node_force(2, k)*sine(k))
+               bn = bn - (node_force(2, k)*cosine(k) - node_force(1, k)*sine(k))
+            end if
+            ! P = mu I + a e'e', e' the axis of rod k + 1; its row across rod k is (pen, pnn).
+            lw2 = length*(omega + p(n_base + k))**2
+            shear = (moment(k) - moment(k - 1))/length
+            inv = 1.0_wp/(mu + a*sd**2)
+            ratio = a*cd*sd*inv
+            a = mu*(mu + a)*inv
+            outward(1, k) = (shear - bn)*inv
+            outward(2, k) = ratio
+            outward(3, k) = lw2
+            be = be - a*lw2 - ratio*(bn - shear)
+            bn = shear
+         end associate
+
+         cd = cosine(k)*cosine(k - 1) + sine(k)*sine(k - 1)
+         sd = sine(k)*cosine(k - 1) - cosine(k)*sine(k - 1)
+         outward(4, k) = cd
+         outward(5, k) = sd
+         r = cd*be - sd*bn
+         bn = sd*be + cd*bn
+         be = r
+      end do inward
+
+      call spacecraft_accelerations(n_base, body, p, node_mass(0), a*cd**2, a*cd*sd, a*sd**2, be, bn, moment(0), &
+                                    base_force, acceleration, ae, an)
+      omega_rate = 0.0_wp
+      if (n_base > 0) omega_rate = acceleration(3)
+
+      do k = 1, n
+         cd = outward(4, k)
+         sd = outward(5, k)
+         r = cd*ae + sd*an
+         an = cd*an - sd*ae
+         ae = r - outward(3, k)
+         outer_an = outward(1, k) - outward(2, k)*ae ! acceleration of node k across the rod
+         acceleration(n_base + k) = (outer_an - an)/rods(rod_of(k))%length - omega_rate
+         an = outer_an
+      end do
+      ok = abs(an) <= huge(an)
+   end subroutine lumped_accelerations
+
+end module rodyn_recursion_lumped

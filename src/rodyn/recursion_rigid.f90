@@ -1,0 +1,113 @@
+!> Accelerations of a chain of rigid rods with distributed mass in O(n): MODEL sec. 4.2 without alpha, beta.
+!>
+!> The recursion of `rodyn_recursion_flexible` with v = 0; see there for the notation and for why the products
+!> are multiplied out.
+module rodyn_recursion_rigid
+   use rodyn_kinds, only: wp
+   use rodyn_rod_constants, only: rod_constants
+   use rodyn_spacecraft, only: spacecraft_body, spacecraft_accelerations
+   implicit none (type, external)
+   private
+   public :: rigid_accelerations
+
+contains
+
+   !> p' = (Vx', Vy', w', phi'') for given rates, hinge moments and loads.
+   pure subroutine rigid_accelerations(n, n_base, rods, rod_of, node_mass, body, sine, cosine, p, moment, &
+                                       base_force, loaded, node_force, outward, acceleration, ok)
+      integer, intent(in) :: n, n_base              !! rods; 3 or 0 unknowns of the spacecraft
+      type(rod_constants), intent(in) :: rods(*)    !! distinct rods
+      integer, intent(in) :: rod_of(n)              !! which of them is rod k
+      real(wp), intent(in) :: node_mass(0:n)        !! mu [kg]
+      type(spacecraft_body), intent(in) :: body     !! mass, inertia, hinge 0
+      real(wp), intent(in) :: sine(0:n), cosine(0:n) !! of phi; 0 and 1 at k = 0
+      real(wp), intent(in) :: p(n_base + n)         !! rates
+      real(wp), intent(in) :: moment(0:n)           !! hinge moments T, T(n) = 0 [N m]
+      real(wp), intent(in) :: base_force(3)         !! X_C, Y_C, M_C, moving axes
+      logical, intent(in) :: loaded                 !! node_force is to be used
+      real(wp), intent(in) :: node_force(2, *)      !! X, Y at nodes (n), moving axes [N]
+      real(wp), intent(out) :: outward(8, n)        !! workspace
+      real(wp), intent(out) :: acceleration(n_base + n) !! p'
+      logical, intent(out) :: ok                    !! false: not finite
+
+      integer :: k
+      real(wp) :: omega, omega_rate, w2, lw2, w_rate, d, r0
+      real(wp) :: pee, pen, pnn, det, be, bn, mu, inv, cn, r, ee, en, nn, cd, sd, ae, an
+
+      omega = 0.0_wp
+      if (n_base > 0) omega = p(3)
+      pee = 0.0_wp
+      pen = 0.0_wp
+      pnn = 0.0_wp
+      det = 0.0_wp
+      be = 0.0_wp
+      bn = 0.0_wp
+
+      inward: do k = n, 1, -1
+         associate (i => rods(rod_of(k))%inertia, length => rods(rod_of(k))%length, &
+                    central => rods(rod_of(k))%central, outer => rods(rod_of(k))%outer)
+            mu = node_mass(k)
+            det = det + mu*(pee + pnn + mu)
+            pee = pee + mu
+            pnn = pnn + mu
+            if (loaded) then
+               be = be - (node_force(1, k)*cosine(k) + node_force(2, k)*sine(k))
+               bn = bn - (node_force(2, k)*cosine(k) - node_force(1, k)*sine(k))
+            end if
+
+            w2 = (omega + p(n_base + k))**2
+            lw2 = length*w2
+            r0 = moment(k) - moment(k - 1)
+            d = i%m2 - length*i%m1
+            inv = 1.0_wp/(i%m2 + length**2*pnn)
+            cn = i%m1 + length*pnn
+            be = be - pee*lw2
+            bn = bn - pen*lw2
+            r = (r0 - length*bn)*inv
+            outward(1, k) = r
+            outward(2, k) = length*pen*inv
+            outward(3, k) = cn*inv
+            outward(4, k) = lw2
+
+            be = be - w2*i%m1 + length*pen*r
+            bn = (bn*d + cn*r0)*inv
+            nn = central + pnn*outer
+            ee = pee*i%m2 + length**2*det
+            en = pen*d*inv
+            det = (i%m0*nn + pee*central + det*outer)*inv
+            ee = i%m0 + ee*inv
+            nn = nn*inv
+         end associate
+
+         cd = cosine(k)*cosine(k - 1) + sine(k)*sine(k - 1)
+         sd = sine(k)*cosine(k - 1) - cosine(k)*sine(k - 1)
+         outward(5, k) = cd
+         outward(6, k) = sd
+         pee = cd*cd*ee + sd*(sd*nn - 2.0_wp*cd*en)
+         pnn = cd*cd*nn + sd*(sd*ee + 2.0_wp*cd*en)
+         pen = cd*sd*(ee - nn) + (cd - sd)*(cd + sd)*en
+         r = cd*be - sd*bn
+         bn = sd*be + cd*bn
+         be = r
+      end do inward
+
+      call spacecraft_accelerations(n_base, body, p, node_mass(0), pee, pen, pnn, be, bn, moment(0), base_force, &
+                                    acceleration, ae, an)
+      omega_rate = 0.0_wp
+      if (n_base > 0) omega_rate = acceleration(3)
+
+      do k = 1, n
+         cd = outward(5, k)
+         sd = outward(6, k)
+         r = cd*ae + sd*an
+         an = cd*an - sd*ae
+         ae = r
+         w_rate = outward(1, k) - outward(2, k)*ae - outward(3, k)*an
+         acceleration(n_base + k) = w_rate - omega_rate
+         ae = ae - outward(4, k)
+         an = an + rods(rod_of(k))%length*w_rate
+      end do
+      ok = abs(an) <= huge(an)
+   end subroutine rigid_accelerations
+
+end module rodyn_recursion_rigid

@@ -1,0 +1,64 @@
+!> Shape functions of a rod and the inertia integrals over them, MODEL sec. 1 and 3.
+module rodyn_rod_integrals
+   use rodyn_kinds, only: wp
+   use rodyn_quadrature, only: gauss_rule
+   implicit none (type, external)
+   private
+   public :: rod_integrals, new_rod_integrals, shape_alpha, shape_beta
+
+   !> Integrals over one rod, 0 <= s <= l; m(s) is its mass per length.
+   type :: rod_integrals
+      real(wp) :: m0 = 0.0_wp !! int m [kg]
+      real(wp) :: m1 = 0.0_wp !! int m s [kg m]
+      real(wp) :: m2 = 0.0_wp !! int m s^2 [kg m^2]
+      real(wp) :: a1 = 0.0_wp !! int m Na [kg m]
+      real(wp) :: b1 = 0.0_wp !! int m Nb [kg m]
+      real(wp) :: sa = 0.0_wp !! int m s Na [kg m^2]
+      real(wp) :: sb = 0.0_wp !! int m s Nb [kg m^2]
+      real(wp) :: aa = 0.0_wp !! int m Na^2 [kg m^2]
+      real(wp) :: ab = 0.0_wp !! int m Na Nb [kg m^2]
+      real(wp) :: bb = 0.0_wp !! int m Nb^2 [kg m^2]
+   end type rod_integrals
+
+contains
+
+   !> Na(s) = s (1 - s/l)^2: deflection for a unit slope at the inner end [m].
+   elemental real(wp) function shape_alpha(s, length)
+      real(wp), intent(in) :: s      !! arc length from the inner node [m]
+      real(wp), intent(in) :: length !! l [m]
+      shape_alpha = s*(1.0_wp - s/length)**2
+   end function shape_alpha
+
+   !> Nb(s) = -(s^2/l)(1 - s/l): deflection for a unit slope at the outer end [m].
+   elemental real(wp) function shape_beta(s, length)
+      real(wp), intent(in) :: s      !! arc length from the inner node [m]
+      real(wp), intent(in) :: length !! l [m]
+      shape_beta = -(s**2/length)*(1.0_wp - s/length)
+   end function shape_beta
+
+   !> All integrals of a rod by a Gauss rule. The mass per length may vary along the rod: it is given at the
+   !> points of the rule. A constant one needs 4 points (Na^2 has degree 6).
+   pure function new_rod_integrals(length, mass_per_length, rule) result(integrals)
+      real(wp), intent(in) :: length             !! l [m]
+      real(wp), intent(in) :: mass_per_length(:) !! m at s = l*rule%points (points) [kg/m]
+      type(gauss_rule), intent(in) :: rule       !! on [0, 1]
+      type(rod_integrals) :: integrals
+      real(wp), dimension(size(rule%points)) :: s, dm, na, nb
+
+      s = length*rule%points
+      dm = length*rule%weights*mass_per_length
+      na = shape_alpha(s, length)
+      nb = shape_beta(s, length)
+      integrals%m0 = sum(dm)
+      integrals%m1 = sum(dm*s)
+      integrals%m2 = sum(dm*s**2)
+      integrals%a1 = sum(dm*na)
+      integrals%b1 = sum(dm*nb)
+      integrals%sa = sum(dm*s*na)
+      integrals%sb = sum(dm*s*nb)
+      integrals%aa = sum(dm*na**2)
+      integrals%ab = sum(dm*na*nb)
+      integrals%bb = sum(dm*nb**2)
+   end function new_rod_integrals
+
+end module rodyn_rod_integrals

@@ -1,0 +1,269 @@
+!> The compiled scene: everything about a case that does not change while it runs.
+!>
+!> `new_scene` turns a case into constants that the kernels read: integrals once per distinct rod, what may be
+!> skipped, and where each unknown stands. Coordinates and rates are vectors in the article's order,
+!>     q = (u_x, u_y, theta, phi, alpha, beta),   p = (Vx, Vy, w, phi', alpha', beta'),
+!> without the first three on a fixed spacecraft and without the last two groups unless bending is dynamic.
+module rodyn_scene
+   use rodyn_kinds, only: wp
+   use rodyn_errors, only: error_type, raise, exit_bad_input
+   use rodyn_case_config, only: case_config
+   use rodyn_quadrature, only: gauss_rule, new_gauss_rule
+   use rodyn_rod_constants, only: rod_constants, new_rod_constants
+   use rodyn_spacecraft, only: spacecraft_body
+   use rodyn_hinge_law, only: hinge_law, new_hinge_law
+   use rodyn_loads, only: load_set, new_load_set
+   implicit none (type, external)
+   private
+   public :: scene_type, new_scene
+
+   !> A compiled case.
+   type :: scene_type
+      integer :: n = 0       !! rods
+      integer :: n_base = 3  !! unknowns of the spacecraft: 3, or 0 when it is fixed
+      integer :: n_dof = 0   !! length of q and of p
+      logical :: dynamic_bending = .true. !! alpha and beta are unknowns
+      logical :: quasistatic = .false.    !! alpha and beta follow from the hinge moments
+      logical :: lumped = .false.         !! all mass in the nodes
+      logical :: consistent = .true.      !! second-order inertia terms kept
+      logical :: assembled = .false.      !! kernel: assembled instead of recursive
+      type(spacecraft_body) :: body
+      real(wp), allocatable :: node_mass(:)    !! (0:n) [kg]; node 0 and the halves of rods only when lumped
+      type(rod_constants), allocatable :: rods(:) !! the distinct rods
+      integer, allocatable :: rod_of(:)        !! which of them is rod k (1:n)
+      type(hinge_law) :: hinges
+      type(load_set) :: loads
+   contains
+      procedure :: phi_at
+      procedure :: alpha_at
+      procedure :: beta_at
+      procedure :: rod
+   end type scene_type
+
+contains
+
+   !> Index in q or p before the chord angles: phi_k stands at phi_at() + k.
+   elemental integer function phi_at(self)
+      class(scene_type), intent(in) :: self
+      phi_at = self%n_base
+   end function phi_at
+
+   !> Index in q or p before the inner slopes.
+   elemental integer function alpha_at(self)
+      class(scene_type), intent(in) :: self
+      alpha_at = self%n_base + self%n
+   end function alpha_at
+
+   !> Index in q or p before the outer slopes.
+   elemental integer function beta_at(self)
+      class(scene_type), intent(in) :: self
+      beta_at = self%n_base + 2*self%n
+   end function beta_at
+
+   !> Constants of rod k.
+   elemental function rod(self, k)
+      class(scene_type), intent(in) :: self
+      integer, intent(in) :: k
+      type(rod_constants) :: rod
+      rod = self%rods(self%rod_of(k))
+   end function rod
+
+   !> Compile a case. Fails, with the reason, on a combination that has no meaning.
+   subroutine new_scene(scene, config, error)
+      type(scene_type), intent(out) :: scene
+      type(case_config), intent(in) :: config
+      type(error_type), allocatable, intent(out) :: error
+
+      call check_combination(config, error)
+      if (allocated(error)) return
+      scene%n = config%chain%n_rods
+      scene%n_base = merge(0, 3, config%spacecraft%motion == 'fixed')
+      scene%dynamic_bending = config%model%bending == 'dynamic'
+      scene%quasistatic = config%model%bending == 'quasistatic'
+      scene%lumped = config%model%inertia == 'lumped'
+      scene%consistent = config%model%formulation == 'consistent'
+      scene%assembled = config%model%kernel == 'assembled'
+      scene%n_dof = scene%n_base + merge(3, 1, scene%dynamic_bending)*scene%n
+      associate (craft => config%spacecraft)
+         scene%body = spacecraft_body(craft%mass, craft%inertia, craft%hinge_x, craft%hinge_y)
+      end associate
+      call compile_rods(scene, config, error)
+      if (allocated(error)) return
+      call compile_nodes(scene, config, error)
+      if (allocated(error)) return
+      call new_hinge_law(scene%hinges, config%chain, scene%quasistatic)
+      call new_load_set(scene%loads, config%loads, config%t_end)
+   end subroutine new_scene
+
+   !> What a combination of choices forbids, MODEL sec. 5.
+   subroutine check_combination(config, error)
+      type(case_config), intent(in) :: config
+      type(error_type), allocatable, intent(out) :: error
+
+      associate (model => config%model)
+         if (config%chain%n_rods < 1) &
+            call raise(error, "&chain n_rods: at least one rod", exit_bad_input)
+         if (model%bending == 'dynamic' .and. model%inertia == 'lumped') &
+            call raise(error, "&model: bending = 'dynamic' needs inertia = 'distributed' "// &
+                       "(rods without inertia have no bending motion of their own)", exit_bad_input)
+         if (model%bending == 'quasistatic' .and. model%inertia == 'distributed') &
+            call raise(error, "&model: bending = 'quasistatic' needs inertia = 'lumped'", exit_bad_input)
+      end associate
+   end subroutine check_combination
+
+   !> Integrals and derived constants, once per distinct (length, mass per length, stiffness).
+   subroutine compile_rods(scene, config, error)
+      type(scene_type), intent(inout) :: scene
+      type(case_config), intent(in) :: config
+      type(error_type), allocatable, intent(out) :: error
+      type(gauss_rule) :: rule
+      type(rod_constants), allocatable :: rods(:)
+      integer, allocatable :: first(:)
+      character(len=12) :: number
+      logical :: ok
+      integer :: j, n_distinct
+
+      call find_distinct(config, scene%rod_of, first)
+      n_distinct = size(first)
+      call new_gauss_rule(rule, config%model%gauss_points)
+      allocate (rods(n_distinct))
+      do j = 1, n_distinct
+         associate (k => first(j), chain => config%chain)
+            call new_rod_constants(rods(j), chain%length(k), chain%mass_per_length(k), stiffness_of(k), rule, &
+                                   scene%lumped, scene%dynamic_bending, scene%consistent, ok)
+            if (.not. ok) then
+               write (number, '(i0)') k
+               call raise(error, '&chain: rod '//trim(number)//' has no bending inertia: dynamic bending needs '// &
+                          'mass_per_length > 0 and gauss_points >= 2', exit_bad_input)
+               return
+            end if
+         end associate
+      end do
+      call move_alloc(rods, scene%rods)
+
+   contains
+
+      real(wp) function stiffness_of(k)
+         integer, intent(in) :: k
+         stiffness_of = 0.0_wp
+         if (config%model%bending /= 'rigid') stiffness_of = config%chain%bending_stiffness(k)
+      end function stiffness_of
+
+   end subroutine compile_rods
+
+   !> Number the distinct rods: `rod_of(k)` is the number of rod k, `first(j)` one rod of number j.
+   !> A sort by value keeps this O(n log n) when all rods differ.
+   subroutine find_distinct(config, rod_of, first)
+      type(case_config), intent(in) :: config
+      integer, allocatable, intent(out) :: rod_of(:) !! (n)
+      integer, allocatable, intent(out) :: first(:)  !! (number of distinct rods)
+      integer, allocatable :: order(:)
+      real(wp), allocatable :: key(:, :)
+      integer :: i, n, n_distinct
+
+      n = config%chain%n_rods
+      allocate (key(3, n), source=0.0_wp)
+      key(1, :) = config%chain%length
+      key(2, :) = config%chain%mass_per_length
+      if (config%model%bending /= 'rigid') key(3, :) = config%chain%bending_stiffness
+      order = sorted_order(key)
+      allocate (rod_of(n), first(n))
+      n_distinct = 0
+      do i = 1, n
+         if (i == 1) then
+            n_distinct = 1
+         else if (any(key(:, order(i)) /= key(:, order(i - 1)))) then
+            n_distinct = n_distinct + 1
+         end if
+         rod_of(order(i)) = n_distinct
+         first(n_distinct) = order(i)
+      end do
+      first = first(:n_distinct)
+   end subroutine find_distinct
+
+   !> Indices that sort the columns of `key` (bottom-up merge sort, stable).
+   pure function sorted_order(key) result(order)
+      real(wp), intent(in) :: key(:, :)
+      integer, allocatable :: order(:)
+      integer, allocatable :: other(:)
+      integer :: n, width, low, middle, high, i, j, m
+
+      n = size(key, 2)
+      allocate (order(n), other(n))
+      order = [(i, i=1, n)]
+      width = 1
+      do while (width < n)
+         do low = 1, n, 2*width
+            middle = min(low + width, n + 1)
+            high = min(low + 2*width, n + 1)
+            i = low
+            j = middle
+            do m = low, high - 1
+               if (j >= high) then
+                  other(m) = order(i)
+                  i = i + 1
+               else if (i >= middle) then
+                  other(m) = order(j)
+                  j = j + 1
+               else if (precedes(key(:, order(j)), key(:, order(i)))) then
+                  other(m) = order(j)
+                  j = j + 1
+               else
+                  other(m) = order(i)
+                  i = i + 1
+               end if
+            end do
+         end do
+         call swap(order, other)
+         width = 2*width
+      end do
+   end function sorted_order
+
+   pure subroutine swap(a, b)
+      integer, allocatable, intent(inout) :: a(:), b(:)
+      integer, allocatable :: c(:)
+      call move_alloc(a, c)
+      call move_alloc(b, a)
+      call move_alloc(c, b)
+   end subroutine swap
+
+   !> Lexical order of two columns.
+   pure logical function precedes(a, b)
+      real(wp), intent(in) :: a(:), b(:)
+      integer :: i
+      precedes = .false.
+      do i = 1, size(a)
+         if (a(i) < b(i)) precedes = .true.
+         if (a(i) /= b(i)) return
+      end do
+   end function precedes
+
+   !> Node masses, with half of each rod's mass at its two nodes when lumped. Every apparent mass that the
+   !> recursion divides by must be positive, so no rod and node may both be without mass.
+   subroutine compile_nodes(scene, config, error)
+      type(scene_type), intent(inout) :: scene
+      type(case_config), intent(in) :: config
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: half_rod
+      character(len=12) :: number
+      integer :: k
+
+      allocate (scene%node_mass(0:scene%n), source=0.0_wp)
+      scene%node_mass(1:) = config%chain%node_mass
+      if (scene%lumped) then
+         do k = 1, scene%n
+            half_rod = 0.5_wp*config%chain%length(k)*config%chain%mass_per_length(k)
+            scene%node_mass(k - 1) = scene%node_mass(k - 1) + half_rod
+            scene%node_mass(k) = scene%node_mass(k) + half_rod
+         end do
+      end if
+      do k = 1, scene%n
+         if (scene%node_mass(k) > 0.0_wp) cycle
+         if (.not. scene%lumped .and. config%chain%mass_per_length(k) > 0.0_wp) cycle
+         write (number, '(i0)') k
+         call raise(error, '&chain: rod '//trim(number)//' and its outer node are both without mass', exit_bad_input)
+         return
+      end do
+   end subroutine compile_nodes
+
+end module rodyn_scene

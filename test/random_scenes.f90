@@ -1,0 +1,151 @@
+!> Random cases of every kind, the same on every machine.
+module test_random_scenes
+   use rodyn_kinds, only: wp
+   use rodyn_case_config, only: case_config, load_config
+   implicit none (type, external)
+   private
+   public :: random_case, seed_random, uniform, kind_name, n_kinds, allocate_case
+
+   integer, parameter :: n_kinds = 12 !! 6 models on a free and on a fixed spacecraft
+
+contains
+
+   !> Start the sequence of random numbers anew.
+   subroutine seed_random(seed)
+      integer, intent(in) :: seed
+      integer, allocatable :: state(:)
+      integer :: i, length
+      call random_seed(size=length)
+      allocate (state(length))
+      state = [(seed + 7919*i, i=1, length)]
+      call random_seed(put=state)
+   end subroutine seed_random
+
+   !> Uniform in [low, high].
+   real(wp) function uniform(low, high)
+      real(wp), intent(in) :: low, high
+      call random_number(uniform)
+      uniform = low + (high - low)*uniform
+   end function uniform
+
+   !> Name of a kind of scene, for messages.
+   function kind_name(which) result(name)
+      integer, intent(in) :: which
+      character(len=:), allocatable :: name
+      type(case_config) :: config
+      call set_kind(config, which)
+      name = trim(config%model%formulation)//' '//trim(config%model%inertia)//' '// &
+             trim(config%model%bending)//' '//trim(config%spacecraft%motion)
+   end function kind_name
+
+   !> Choose the model: 1..n_kinds.
+   subroutine set_kind(config, which)
+      type(case_config), intent(inout) :: config
+      integer, intent(in) :: which
+      config%spacecraft%motion = merge('free ', 'fixed', which <= n_kinds/2)
+      select case (mod(which - 1, n_kinds/2))
+      case (0)
+         config%model%formulation = 'consistent'
+      case (1)
+         config%model%formulation = 'paper'
+      case (2)
+         config%model%bending = 'rigid'
+      case (3)
+         config%model%bending = 'rigid'
+         config%model%formulation = 'paper'
+      case (4)
+         config%model%inertia = 'lumped'
+         config%model%bending = 'rigid'
+      case (5)
+         config%model%inertia = 'lumped'
+         config%model%bending = 'quasistatic'
+      end select
+   end subroutine set_kind
+
+   !> Arrays of a case with n rods, zero where zero is a sensible default.
+   subroutine allocate_case(config, n)
+      type(case_config), intent(inout) :: config
+      integer, intent(in) :: n
+      config%chain%n_rods = n
+      allocate (config%chain%length(n), config%chain%mass_per_length(n), config%chain%bending_stiffness(n), &
+                config%chain%node_mass(n), config%chain%hinge_stiffness(0:n - 1), config%chain%hinge_damping(0:n - 1), &
+                config%chain%kink(0:n - 1), config%initial%phi(n), config%initial%alpha(n), config%initial%beta(n), &
+                config%initial%phi_rate(n), config%initial%alpha_rate(n), config%initial%beta_rate(n), source=0.0_wp)
+      allocate (config%loads(0))
+      config%title = ''
+   end subroutine allocate_case
+
+   !> A random case of kind 1..n_kinds: all rods, nodes and hinges different, loads, damping and kinks or not.
+   subroutine random_case(config, which, n)
+      type(case_config), intent(out) :: config
+      integer, intent(in) :: which, n
+      integer :: k
+
+      call set_kind(config, which)
+      call allocate_case(config, n)
+      config%spacecraft%mass = uniform(1.0_wp, 200.0_wp)
+      config%spacecraft%inertia = uniform(0.5_wp, 50.0_wp)
+      config%spacecraft%hinge_x = uniform(-1.0_wp, 1.0_wp)
+      config%spacecraft%hinge_y = uniform(-1.0_wp, 1.0_wp)
+      do k = 1, n
+         config%chain%length(k) = uniform(0.3_wp, 2.0_wp)
+         config%chain%mass_per_length(k) = uniform(0.2_wp, 3.0_wp)
+         config%chain%bending_stiffness(k) = 10.0_wp**uniform(2.0_wp, 4.0_wp)
+         config%chain%node_mass(k) = max(0.0_wp, uniform(-1.0_wp, 2.0_wp))
+         config%chain%hinge_stiffness(k - 1) = max(0.0_wp, uniform(-500.0_wp, 5000.0_wp))
+         if (mod(which + n, 2) == 0) config%chain%hinge_damping(k - 1) = uniform(0.0_wp, 2.0_wp)
+         if (mod(n, 3) == 0) config%chain%kink(k - 1) = uniform(-0.5_wp, 0.5_wp)
+      end do
+      if (n > 1) config%chain%length(2) = config%chain%length(1) ! not quite distinct rods
+      call random_initial(config, n)
+      call random_loads(config, n)
+   end subroutine random_case
+
+   subroutine random_initial(config, n)
+      type(case_config), intent(inout) :: config
+      integer, intent(in) :: n
+      integer :: k
+
+      do k = 1, n
+         config%initial%phi(k) = uniform(-4.0_wp, 4.0_wp)
+         config%initial%phi_rate(k) = uniform(-5.0_wp, 5.0_wp)
+         if (config%model%bending /= 'dynamic') cycle
+         config%initial%alpha(k) = uniform(-0.1_wp, 0.1_wp)
+         config%initial%beta(k) = uniform(-0.1_wp, 0.1_wp)
+         config%initial%alpha_rate(k) = uniform(-5.0_wp, 5.0_wp)
+         config%initial%beta_rate(k) = uniform(-5.0_wp, 5.0_wp)
+      end do
+      if (config%spacecraft%motion == 'fixed') return
+      config%initial%velocity_x = uniform(-2.0_wp, 2.0_wp)
+      config%initial%velocity_y = uniform(-2.0_wp, 2.0_wp)
+      config%initial%omega = uniform(-3.0_wp, 3.0_wp)
+      config%initial%displacement_x = uniform(-1.0_wp, 1.0_wp)
+      config%initial%displacement_y = uniform(-1.0_wp, 1.0_wp)
+      config%initial%rotation = uniform(-3.0_wp, 3.0_wp)
+   end subroutine random_initial
+
+   !> A moment and forces on the spacecraft, and forces on two nodes.
+   subroutine random_loads(config, n)
+      type(case_config), intent(inout) :: config
+      integer, intent(in) :: n
+      type(load_config) :: load
+      integer :: i
+
+      deallocate (config%loads)
+      allocate (config%loads(5))
+      do i = 1, 5
+         load%law = merge('constant    ', 'sine_squared', mod(i, 2) == 0)
+         load%rate = uniform(0.5_wp, 3.0_wp)
+         load%value = uniform(-500.0_wp, 500.0_wp)
+         load%component = merge('X', 'Y', i <= 2)
+         load%target = merge('spacecraft', 'node      ', i <= 3)
+         if (i == 3) load%component = 'M'
+         load%node = 0
+         if (i > 3) load%node = 1 + int(uniform(0.0_wp, real(n, wp)))
+         if (i == 5) load%component = 'X'
+         load%node = min(load%node, n)
+         config%loads(i) = load
+      end do
+   end subroutine random_loads
+
+end module test_random_scenes
