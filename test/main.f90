@@ -2,6 +2,7 @@
 program tester
    use test_testing, only: suite_tally, unittest, run_suite
    use test_kernels, only: collect_kernels
+   use test_motion, only: collect_motion
    implicit none (type, external)
    type(suite_tally) :: tally
    type(unittest), allocatable :: suite(:)
@@ -13,6 +14,8 @@ program tester
    call collect_kernels(suite)
    call run_suite('kernels', suite, tally, trim(filter))
 
+   call collect_motion(suite)
+   call run_suite("motion", suite, tally, trim(filter))
    write (*, '(i0, " passed, ", i0, " failed")') tally%passed, tally%failed
    if (tally%failed > 0 .or. tally%passed == 0) error stop 1, quiet=.true.
 end program tester

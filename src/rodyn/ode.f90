@@ -23,8 +23,8 @@ module rodyn_ode
          implicit none (type, external)
          class(ode_system), intent(inout) :: self
          real(wp), intent(in) :: t       !! time [s]
-         real(wp), intent(in) :: y(:)    !! states (n_states)
-         real(wp), intent(out) :: ydot(:) !! their rates (n_states)
+         real(wp), contiguous, intent(in) :: y(:)    !! states (n_states)
+         real(wp), contiguous, intent(out) :: ydot(:) !! their rates (n_states)
          logical, intent(out) :: ok      !! false: not finite, or a factorization failed
       end subroutine rhs_interface
 
@@ -34,8 +34,8 @@ module rodyn_ode
          implicit none (type, external)
          class(ode_system), intent(inout) :: self
          real(wp), intent(in) :: t         !! time [s]
-         real(wp), intent(in) :: y(:)      !! states (n_states)
-         real(wp), intent(out) :: jac(:, :) !! df_i/dy_j (n_states, n_states)
+         real(wp), contiguous, intent(in) :: y(:)      !! states (n_states)
+         real(wp), contiguous, intent(out) :: jac(:, :) !! df_i/dy_j (n_states, n_states)
          logical, intent(out) :: ok        !! false: it could not be formed
       end subroutine jacobian_interface
    end interface

@@ -1,0 +1,207 @@
+!> Positions, velocities, energies and momenta of a scene in a given state, MODEL sec. 1 and 2. O(n).
+module rodyn_kinematics
+   use rodyn_kinds, only: wp
+   use rodyn_scene, only: scene_type
+   use rodyn_hinge_law, only: hinge_state
+   use rodyn_three_moments, only: slopes_from_moments
+   implicit none (type, external)
+   private
+   public :: invariants_type, invariants, load_power, dissipated_power, slopes, kinetic_energy
+
+   !> What the ledger records of a state. Momenta along inertial axes, angular momentum about their origin.
+   type :: invariants_type
+      real(wp) :: kinetic = 0.0_wp          !! kinetic energy, all terms kept in either formulation [J]
+      real(wp) :: elastic = 0.0_wp          !! energy of hinges and rods [J]
+      real(wp) :: momentum(2) = 0.0_wp      !! [kg m/s]
+      real(wp) :: angular_momentum = 0.0_wp !! [kg m^2/s]
+   end type invariants_type
+
+   !> Sums over the chain, moving axes.
+   type :: chain_sums
+      real(wp) :: kinetic = 0.0_wp
+      real(wp) :: momentum(2) = 0.0_wp
+      real(wp) :: turning = 0.0_wp !! angular momentum about the inertial origin
+   end type chain_sums
+
+contains
+
+   !> Energies and momenta of a state.
+   pure function invariants(scene, q, p) result(values)
+      type(scene_type), intent(in) :: scene
+      real(wp), intent(in) :: q(:), p(:) !! coordinates and rates (dof)
+      type(invariants_type) :: values
+      type(chain_sums) :: sums
+      real(wp) :: velocity(2), place(2), rotation
+
+      velocity = 0.0_wp
+      place = 0.0_wp
+      rotation = 0.0_wp
+      call sum_chain(scene, q, p, sums)
+      values%kinetic = sums%kinetic
+      if (scene%n_base > 0) then
+         velocity = p(1:2)
+         place = q(1:2)
+         rotation = q(3)
+         associate (body => scene%body)
+            values%kinetic = values%kinetic + 0.5_wp*(body%mass*sum(velocity**2) + body%inertia*p(3)**2)
+            sums%momentum = sums%momentum + body%mass*velocity
+            sums%turning = sums%turning + body%mass*cross(place, velocity) + body%inertia*p(3)
+         end associate
+      end if
+      values%elastic = elastic_energy(scene, q)
+      values%momentum = [cos(rotation)*sums%momentum(1) - sin(rotation)*sums%momentum(2), &
+                         sin(rotation)*sums%momentum(1) + cos(rotation)*sums%momentum(2)]
+      values%angular_momentum = sums%turning
+   end function invariants
+
+   !> Kinetic energy [J].
+   pure real(wp) function kinetic_energy(scene, q, p)
+      type(scene_type), intent(in) :: scene
+      real(wp), intent(in) :: q(:), p(:)
+      type(invariants_type) :: values
+      values = invariants(scene, q, p)
+      kinetic_energy = values%kinetic
+   end function kinetic_energy
+
+   !> One pass outward. A point of rod k moves by U + W (s n - v e) + v' n, U the velocity of its inner node.
+   pure subroutine sum_chain(scene, q, p, sums)
+      type(scene_type), intent(in) :: scene
+      real(wp), intent(in) :: q(:), p(:)
+      type(chain_sums), intent(out) :: sums
+      real(wp) :: u(2), place(2), axis(2), normal(2), omega, w, x(2), xr(2), first(2), flow(2), spin, inertia
+      integer :: k
+
+      call at_hinge_0(scene, q, p, place, u, omega)
+      call add_mass(sums, scene%node_mass(0), place, u)
+      do k = 1, scene%n
+         axis = [cos(q(scene%phi_at() + k)), sin(q(scene%phi_at() + k))]
+         normal = [-axis(2), axis(1)]
+         w = omega + p(scene%phi_at() + k)
+         x = 0.0_wp
+         xr = 0.0_wp
+         if (scene%dynamic_bending) then
+            x = [q(scene%alpha_at() + k), q(scene%beta_at() + k)]
+            xr = [p(scene%alpha_at() + k), p(scene%beta_at() + k)]
+         end if
+         associate (rod => scene%rods(scene%rod_of(k)), i => scene%rods(scene%rod_of(k))%inertia)
+            first = i%m1*axis + (i%a1*x(1) + i%b1*x(2))*normal           ! int m (s e + v n)
+            flow = w*[-first(2), first(1)] + (i%a1*xr(1) + i%b1*xr(2))*normal
+            inertia = i%m2 + i%aa*x(1)**2 + 2.0_wp*i%ab*x(1)*x(2) + i%bb*x(2)**2
+            spin = w*inertia + i%sa*xr(1) + i%sb*xr(2)
+            sums%kinetic = sums%kinetic + 0.5_wp*(i%m0*sum(u**2) + w*(2.0_wp*spin - w*inertia) + &
+                                                  i%aa*xr(1)**2 + 2.0_wp*i%ab*xr(1)*xr(2) + i%bb*xr(2)**2) + &
+                           dot_product(u, flow)
+            sums%momentum = sums%momentum + i%m0*u + flow
+            sums%turning = sums%turning + cross(place, i%m0*u + flow) + cross(first, u) + spin
+            place = place + rod%length*axis
+            u = u + rod%length*w*normal
+         end associate
+         call add_mass(sums, scene%node_mass(k), place, u)
+      end do
+   end subroutine sum_chain
+
+   !> A point mass.
+   pure subroutine add_mass(sums, mass, place, u)
+      type(chain_sums), intent(inout) :: sums
+      real(wp), intent(in) :: mass, place(2), u(2)
+      sums%kinetic = sums%kinetic + 0.5_wp*mass*sum(u**2)
+      sums%momentum = sums%momentum + mass*u
+      sums%turning = sums%turning + mass*cross(place, u)
+   end subroutine add_mass
+
+   !> Place (from the inertial origin) and velocity of hinge 0, moving axes.
+   pure subroutine at_hinge_0(scene, q, p, place, u, omega)
+      type(scene_type), intent(in) :: scene
+      real(wp), intent(in) :: q(:), p(:)
+      real(wp), intent(out) :: place(2), u(2), omega
+      place = [scene%body%hinge_x, scene%body%hinge_y]
+      u = 0.0_wp
+      omega = 0.0_wp
+      if (scene%n_base == 0) return
+      omega = p(3)
+      u = p(1:2) + omega*[-place(2), place(1)]
+      place = place + q(1:2)
+   end subroutine at_hinge_0
+
+   pure real(wp) function cross(a, b)
+      real(wp), intent(in) :: a(2), b(2)
+      cross = a(1)*b(2) - a(2)*b(1)
+   end function cross
+
+   !> Elastic energy of hinges and rods [J]. Quasistatic rods hold l/(6 EI) (T^2 + T T' + T'^2) under end
+   !> moments T, T'; that is the bending energy of their slopes.
+   pure real(wp) function elastic_energy(scene, q)
+      type(scene_type), intent(in) :: scene
+      real(wp), intent(in) :: q(:)
+      real(wp) :: theta(0:scene%n - 1), unused(0:scene%n - 1), alpha(scene%n), beta(scene%n)
+      integer :: k
+
+      associate (first => scene%n_base + 1)
+         call hinge_state(scene%hinges, scene%n, scene%dynamic_bending, q(first:), q(first:), theta, unused)
+      end associate
+      elastic_energy = 0.5_wp*sum(scene%hinges%stiffness*theta**2)
+      if (.not. (scene%dynamic_bending .or. scene%quasistatic)) return
+      call slopes(scene, q, alpha, beta)
+      do k = 1, scene%n
+         elastic_energy = elastic_energy + scene%rods(scene%rod_of(k))%kappa* &
+                          (alpha(k)**2 + alpha(k)*beta(k) + beta(k)**2)
+      end do
+   end function elastic_energy
+
+   !> End slopes alpha, beta: states, or slaved to the hinge springs (without their dampers), or zero.
+   pure subroutine slopes(scene, q, alpha, beta)
+      type(scene_type), intent(in) :: scene
+      real(wp), intent(in) :: q(:)
+      real(wp), intent(out) :: alpha(:), beta(:) !! (n) [rad]
+      real(wp) :: theta(0:scene%n - 1), unused(0:scene%n - 1)
+
+      alpha = 0.0_wp
+      beta = 0.0_wp
+      associate (n => scene%n, first => scene%n_base + 1)
+         if (scene%dynamic_bending) then
+            alpha = q(scene%alpha_at() + 1:scene%alpha_at() + n)
+            beta = q(scene%beta_at() + 1:scene%beta_at() + n)
+         else if (scene%quasistatic) then
+            call hinge_state(scene%hinges, n, .false., q(first:), q(first:), theta, unused)
+            call slopes_from_moments(scene%hinges%series, scene%hinges%stiffness*theta, alpha, beta)
+         end if
+      end associate
+   end subroutine slopes
+
+   !> Power that the dampers take, sum D th'^2 [W].
+   pure real(wp) function dissipated_power(scene, p)
+      type(scene_type), intent(in) :: scene
+      real(wp), intent(in) :: p(:)
+      real(wp) :: rate(0:scene%n - 1), unused(0:scene%n - 1)
+
+      dissipated_power = 0.0_wp
+      if (.not. scene%hinges%has_damping) return
+      associate (first => scene%n_base + 1)
+         call hinge_state(scene%hinges, scene%n, scene%dynamic_bending, p(first:), p(first:), unused, rate)
+      end associate
+      dissipated_power = sum(scene%hinges%damping*rate**2)
+   end function dissipated_power
+
+   !> Power of the loads on the spacecraft and on the nodes [W].
+   pure real(wp) function load_power(scene, q, p, base_force, loaded, node_force)
+      type(scene_type), intent(in) :: scene
+      real(wp), intent(in) :: q(:), p(:)
+      real(wp), intent(in) :: base_force(3)    !! X_C, Y_C, M_C, moving axes
+      logical, intent(in) :: loaded            !! node_force is to be used
+      real(wp), intent(in) :: node_force(:, :) !! X, Y at the nodes (2, n)
+      real(wp) :: place(2), u(2), omega
+      integer :: k
+
+      load_power = 0.0_wp
+      if (scene%n_base > 0) load_power = dot_product(base_force, p(1:3))
+      if (.not. loaded) return
+      call at_hinge_0(scene, q, p, place, u, omega)
+      do k = 1, scene%n
+         associate (angle => q(scene%phi_at() + k), w => omega + p(scene%phi_at() + k))
+            u = u + scene%rods(scene%rod_of(k))%length*w*[-sin(angle), cos(angle)]
+         end associate
+         load_power = load_power + dot_product(node_force(:, k), u)
+      end do
+   end function load_power
+
+end module rodyn_kinematics

@@ -1,0 +1,183 @@
+!> Exact derivatives of the equations of motion at a state.
+!>
+!> The balance of a scene,  R(q, p, a) = M(q) a - rhs(q, p) = 0,  is differentiated line by line in a direction
+!> (dq, dp) with the accelerations a held fixed: one pass outward for the motion of the nodes, one inward for the
+!> forces, O(n) a direction. Then dR/dq is the tangent stiffness, dR/dp the damping and gyroscopic matrix, and
+!>     d a = -M^-1 (dR/dq dq + dR/dp dp).
+module rodyn_linearisation
+   use rodyn_kinds, only: wp
+   use rodyn_scene, only: scene_type
+   use rodyn_hinge_law, only: hinge_tangent
+   implicit none (type, external)
+   private
+   public :: balance_tangent
+
+contains
+
+   !> dR in the direction (dq, dp).
+   pure subroutine balance_tangent(scene, q, p, a, loaded, node_force, dq, dp, dr)
+      type(scene_type), intent(in) :: scene
+      real(wp), intent(in) :: q(:), p(:)   !! state (dof)
+      real(wp), intent(in) :: a(:)         !! accelerations p' (dof), held fixed
+      logical, intent(in) :: loaded        !! node_force is to be used
+      real(wp), intent(in) :: node_force(:, :) !! X, Y at the nodes (2, n) [N]
+      real(wp), intent(in) :: dq(:), dp(:) !! direction (dof)
+      real(wp), intent(out) :: dr(:)       !! change of the balance (dof), rows as in p
+      real(wp) :: inner(2, scene%n), d_inner(2, scene%n) ! acceleration of the inner node of rod k and its change
+      real(wp) :: moment(0:scene%n), work(0:scene%n - 1)
+
+      associate (first => scene%n_base + 1)
+         call hinge_tangent(scene%hinges, scene%n, scene%dynamic_bending, dq(first:), dp(first:), work, moment)
+      end associate
+      call outward_pass(scene, q, p, a, dq, dp, inner, d_inner)
+      call inward_pass(scene, q, p, a, loaded, node_force, dq, dp, inner, d_inner, moment, dr)
+   end subroutine balance_tangent
+
+   !> Accelerations of the inner nodes: A_k = A_{k-1} + l n W' - l W^2 e.
+   pure subroutine outward_pass(scene, q, p, a, dq, dp, inner, d_inner)
+      type(scene_type), intent(in) :: scene
+      real(wp), intent(in) :: q(:), p(:), a(:), dq(:), dp(:)
+      real(wp), intent(out) :: inner(:, :), d_inner(:, :)
+      real(wp) :: node(2), d_node(2), e(2), n(2), w, dw, wr, length, omega, d_omega, omega_rate
+      integer :: k, x
+
+      node = 0.0_wp
+      d_node = 0.0_wp
+      omega = 0.0_wp
+      d_omega = 0.0_wp
+      omega_rate = 0.0_wp
+      if (scene%n_base > 0) then
+         omega = p(3)
+         d_omega = dp(3)
+         omega_rate = a(3)
+         e = [scene%body%hinge_x, scene%body%hinge_y]
+         node = [a(1) - omega*p(2), a(2) + omega*p(1)] + omega_rate*[-e(2), e(1)] - omega**2*e
+         d_node = [-d_omega*p(2) - omega*dp(2), d_omega*p(1) + omega*dp(1)] - 2.0_wp*omega*d_omega*e
+      end if
+      do k = 1, scene%n
+         inner(:, k) = node
+         d_inner(:, k) = d_node
+         x = scene%phi_at() + k
+         length = scene%rods(scene%rod_of(k))%length
+         e = [cos(q(x)), sin(q(x))]
+         n = [-e(2), e(1)]
+         w = omega + p(x)
+         dw = d_omega + dp(x)
+         wr = omega_rate + a(x)
+         node = node + length*(wr*n - w**2*e)
+         d_node = d_node + length*(-dq(x)*(wr*e + w**2*n) - 2.0_wp*w*dw*e)
+      end do
+   end subroutine outward_pass
+
+   !> Inertia forces and rows of the balance, from the tip inward. A force with components (fe, fn) along and
+   !> across rod k changes by d(fe), d(fn) and turns with the rod.
+   pure subroutine inward_pass(scene, q, p, a, loaded, node_force, dq, dp, inner, d_inner, moment, dr)
+      type(scene_type), intent(in) :: scene
+      real(wp), intent(in) :: q(:), p(:), a(:)
+      logical, intent(in) :: loaded
+      real(wp), intent(in) :: node_force(:, :), dq(:), dp(:), inner(:, :), d_inner(:, :), moment(0:)
+      real(wp), intent(out) :: dr(:)
+      real(wp) :: force(2), d_force(2), node(2), d_node(2), e(2), n(2), w, dw, wr, omega, d_omega, omega_rate
+      real(wp) :: turn
+      integer :: k, f
+
+      omega = 0.0_wp
+      d_omega = 0.0_wp
+      omega_rate = 0.0_wp
+      if (scene%n_base > 0) then
+         omega = p(3)
+         d_omega = dp(3)
+         omega_rate = a(3)
+      end if
+      dr = 0.0_wp
+      turn = 0.0_wp
+      force = 0.0_wp ! that rod k puts on its outer node, and its change
+      d_force = 0.0_wp
+      do k = scene%n, 1, -1
+         f = scene%phi_at() + k
+         e = [cos(q(f)), sin(q(f))]
+         n = [-e(2), e(1)]
+         w = omega + p(f)
+         dw = d_omega + dp(f)
+         wr = omega_rate + a(f)
+         associate (rod => scene%rods(scene%rod_of(k)))
+            node = inner(:, k) + rod%length*(wr*n - w**2*e)
+            d_node = d_inner(:, k) + rod%length*(-dq(f)*(wr*e + w**2*n) - 2.0_wp*w*dw*e)
+            force = force + scene%node_mass(k)*node
+            d_force = d_force + scene%node_mass(k)*d_node
+            if (loaded) force = force - node_force(:, k)
+            dr(f) = rod%length*(dot_product(n, d_force) - dq(f)*dot_product(e, force)) - (moment(k) - moment(k - 1))
+         end associate
+         call add_rod(scene, k, q, p, a, dq, dp, e, n, w, dw, wr, inner(:, k), d_inner(:, k), moment, force, d_force, dr)
+         turn = turn + dr(f)
+      end do
+      if (scene%n_base == 0) return
+      node = inner(:, 1) ! hinge 0
+      d_force = d_force + scene%node_mass(0)*d_inner(:, 1)
+      associate (body => scene%body)
+         dr(1) = d_force(1) - body%mass*(d_omega*p(2) + omega*dp(2))
+         dr(2) = d_force(2) + body%mass*(d_omega*p(1) + omega*dp(1))
+         ! The row of w: the spacecraft turns alone (T_0 acts on it), and every rod turns with it.
+         dr(3) = turn + body%hinge_x*d_force(2) - body%hinge_y*d_force(1) - moment(0)
+      end associate
+   end subroutine inward_pass
+
+   !> Rows of rod k, MODEL sec. 3, and its share of the force on the inner node.
+   pure subroutine add_rod(scene, k, q, p, a, dq, dp, e, n, w, dw, wr, inner, d_inner, moment, force, d_force, dr)
+      type(scene_type), intent(in) :: scene
+      integer, intent(in) :: k
+      real(wp), intent(in) :: q(:), p(:), a(:), dq(:), dp(:)
+      real(wp), intent(in) :: e(2), n(2), w, dw, wr, inner(2), d_inner(2), moment(0:)
+      real(wp), intent(inout) :: force(2), d_force(2), dr(:)
+      real(wp) :: ae, an, d_ae, d_an, fe, fn, d_fe, d_fn, d_phi
+      real(wp) :: x(2), v(2), acc(2), dx(2), dv(2), bx(2), sx(2), mv, d_mv, d_mv_rate, mv_rate
+      integer :: f, ia, ib
+
+      f = scene%phi_at() + k
+      d_phi = dq(f)
+      ae = dot_product(inner, e)
+      an = dot_product(inner, n)
+      d_ae = dot_product(d_inner, e) + d_phi*an
+      d_an = dot_product(d_inner, n) - d_phi*ae
+      associate (rod => scene%rods(scene%rod_of(k)), i => scene%rods(scene%rod_of(k))%inertia)
+         fe = i%m0*ae - w**2*i%m1
+         fn = i%m0*an + wr*i%m1
+         d_fe = i%m0*d_ae - 2.0_wp*w*dw*i%m1
+         d_fn = i%m0*d_an
+         dr(f) = dr(f) + i%m1*d_an
+         if (scene%dynamic_bending) then
+            ia = scene%alpha_at() + k
+            ib = scene%beta_at() + k
+            x = [q(ia), q(ib)]
+            v = [p(ia), p(ib)]
+            acc = [a(ia), a(ib)]
+            dx = [dq(ia), dq(ib)]
+            dv = [dp(ia), dp(ib)]
+            mv = i%a1*x(1) + i%b1*x(2)
+            mv_rate = i%a1*v(1) + i%b1*v(2)
+            d_mv = i%a1*dx(1) + i%b1*dx(2)
+            d_mv_rate = i%a1*dv(1) + i%b1*dv(2)
+            fe = fe - wr*mv - 2.0_wp*w*mv_rate
+            fn = fn - w**2*mv + i%a1*acc(1) + i%b1*acc(2)
+            d_fe = d_fe - wr*d_mv - 2.0_wp*(dw*mv_rate + w*d_mv_rate)
+            d_fn = d_fn - 2.0_wp*w*dw*mv - w**2*d_mv
+            sx = times(rod%second, x)
+            dr(f) = dr(f) - d_mv*ae - mv*d_ae + 2.0_wp*wr*dot_product(sx, dx) + 2.0_wp*dw*dot_product(sx, v) + &
+                    2.0_wp*w*(dot_product(times(rod%second, dx), v) + dot_product(sx, dv))
+            bx = times([i%aa, i%ab, i%bb], 2.0_wp*w*dw*x + w**2*dx)
+            dr(ia) = i%a1*d_an - bx(1) + moment(k - 1) + rod%kappa*(2.0_wp*dx(1) + dx(2))
+            dr(ib) = i%b1*d_an - bx(2) - moment(k) + rod%kappa*(dx(1) + 2.0_wp*dx(2))
+         end if
+         force = force + fe*e + fn*n
+         d_force = d_force + (d_fe - d_phi*fn)*e + (d_fn + d_phi*fe)*n
+      end associate
+   end subroutine add_rod
+
+   !> Symmetric 2x2 matrix (1,1), (1,2), (2,2) times a vector.
+   pure function times(matrix, x) result(y)
+      real(wp), intent(in) :: matrix(3), x(2)
+      real(wp) :: y(2)
+      y = [matrix(1)*x(1) + matrix(2)*x(2), matrix(2)*x(1) + matrix(3)*x(2)]
+   end function times
+
+end module rodyn_linearisation
