@@ -68,16 +68,16 @@ contains
    subroutine accelerations(self, t, q, p, acceleration, ok)
       class(dynamics_type), intent(inout) :: self
       real(wp), intent(in) :: t                !! [s], within the regime
-      real(wp), contiguous, intent(in) :: q(:)             !! coordinates (dof)
-      real(wp), contiguous, intent(in) :: p(:)             !! rates (dof)
-      real(wp), contiguous, intent(out) :: acceleration(:) !! p' (dof)
+      real(wp), intent(in) :: q(self%scene%n_dof)             !! coordinates
+      real(wp), intent(in) :: p(self%scene%n_dof)             !! rates
+      real(wp), intent(out) :: acceleration(self%scene%n_dof) !! p'
       logical, intent(out) :: ok               !! false: not finite, or M not positive definite
 
       associate (scene => self%scene, work => self%work, first => self%scene%n_base + 1)
          if (self%varying) call evaluate_loads(self%forces, self%regime, t, fresh=.false.)
-         call sine_cosine(scene%n, q(first:), work%sine(1:), work%cosine(1:))
+         call sine_cosine(scene%n, q(first), work%sine(1:), work%cosine(1:))
          if (self%path /= path_assembled) &
-            call hinge_moments(scene%hinges, scene%n, scene%dynamic_bending, q(first:), p(first:), work%theta, work%moment)
+            call hinge_moments(scene%hinges, scene%n, scene%dynamic_bending, q(first), p(first), work%theta, work%moment)
          select case (self%path)
          case (path_flexible)
             call flexible_accelerations(scene%n, scene%n_base, scene%rods, scene%rod_of, scene%node_mass, scene%body, &

@@ -55,16 +55,59 @@ contains
 
       if (law%quasistatic) then
          call series_moments(law, n, angle, angle_rate, theta, moment)
-         return
+      else if (flexible) then
+         call flexible_moments(n, law%stiffness, law%damping, law%kink, law%has_damping, law%has_kinks, &
+                               angle, angle_rate, moment)
+      else
+         call rigid_moments(n, law%stiffness, law%damping, law%kink, law%has_damping, law%has_kinks, &
+                            angle, angle_rate, moment)
       end if
-      call openings(n, flexible, angle, theta)
-      if (law%has_kinks) theta = theta - law%kink
-      moment(0:n - 1) = law%stiffness*theta
-      moment(n) = 0.0_wp
-      if (.not. law%has_damping) return
-      call openings(n, flexible, angle_rate, theta)
-      moment(0:n - 1) = moment(0:n - 1) + law%damping*theta
    end subroutine hinge_moments
+
+   !> T = C (opening - gamma) + D opening' between rods that bend.
+   pure subroutine flexible_moments(n, stiffness, damping, kink, damped, kinked, angle, angle_rate, moment)
+      integer, intent(in) :: n
+      real(wp), intent(in) :: stiffness(0:n - 1), damping(0:n - 1), kink(0:n - 1)
+      logical, intent(in) :: damped, kinked
+      real(wp), intent(in) :: angle(n, 3), angle_rate(n, 3) !! phi, alpha, beta and rates
+      real(wp), intent(out) :: moment(0:n)
+      integer :: k
+
+      moment(0) = stiffness(0)*(angle(1, 1) + angle(1, 2))
+      do k = 1, n - 1
+         moment(k) = stiffness(k)*((angle(k + 1, 1) + angle(k + 1, 2)) - (angle(k, 1) + angle(k, 3)))
+      end do
+      moment(n) = 0.0_wp
+      if (kinked) moment(0:n - 1) = moment(0:n - 1) - stiffness*kink
+      if (.not. damped) return
+      moment(0) = moment(0) + damping(0)*(angle_rate(1, 1) + angle_rate(1, 2))
+      do k = 1, n - 1
+         moment(k) = moment(k) + damping(k)*((angle_rate(k + 1, 1) + angle_rate(k + 1, 2)) - &
+                                             (angle_rate(k, 1) + angle_rate(k, 3)))
+      end do
+   end subroutine flexible_moments
+
+   !> The same between rigid rods.
+   pure subroutine rigid_moments(n, stiffness, damping, kink, damped, kinked, angle, angle_rate, moment)
+      integer, intent(in) :: n
+      real(wp), intent(in) :: stiffness(0:n - 1), damping(0:n - 1), kink(0:n - 1)
+      logical, intent(in) :: damped, kinked
+      real(wp), intent(in) :: angle(n), angle_rate(n) !! phi and rates
+      real(wp), intent(out) :: moment(0:n)
+      integer :: k
+
+      moment(0) = stiffness(0)*angle(1)
+      do k = 1, n - 1
+         moment(k) = stiffness(k)*(angle(k + 1) - angle(k))
+      end do
+      moment(n) = 0.0_wp
+      if (kinked) moment(0:n - 1) = moment(0:n - 1) - stiffness*kink
+      if (.not. damped) return
+      moment(0) = moment(0) + damping(0)*angle_rate(1)
+      do k = 1, n - 1
+         moment(k) = moment(k) + damping(k)*(angle_rate(k + 1) - angle_rate(k))
+      end do
+   end subroutine rigid_moments
 
    !> Opening of each hinge, without its kink; the same map takes rates to rates.
    pure subroutine openings(n, flexible, angle, opening)

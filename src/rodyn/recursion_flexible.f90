@@ -130,8 +130,8 @@ contains
          be = r
       end do inward
 
-      call spacecraft_accelerations(n_base, body, p, node_mass(0), pee, pen, pnn, be, bn, moment(0), base_force, &
-                                    acceleration, ae, an)
+      call spacecraft_accelerations(n_base, body, p, node_mass(0), pee, pen, pnn, det, be, bn, moment(0), &
+                                    base_force, acceleration, ae, an)
       omega_rate = 0.0_wp
       if (n_base > 0) omega_rate = acceleration(3)
 

@@ -72,8 +72,8 @@ contains
          be = r
       end do inward
 
-      call spacecraft_accelerations(n_base, body, p, node_mass(0), a*cd**2, a*cd*sd, a*sd**2, be, bn, moment(0), &
-                                    base_force, acceleration, ae, an)
+      call spacecraft_accelerations(n_base, body, p, node_mass(0), a*cd**2, a*cd*sd, a*sd**2, 0.0_wp, be, bn, &
+                                    moment(0), base_force, acceleration, ae, an)
       omega_rate = 0.0_wp
       if (n_base > 0) omega_rate = acceleration(3)
 

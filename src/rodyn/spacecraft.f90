@@ -17,22 +17,27 @@ contains
 
    !> Accelerations of the spacecraft under the chain's force f = P A + b at hinge 0, and the acceleration of
    !> that hinge. With r = (x0, y0), rr = (-y0, x0), A = A_C + rr w' - r w^2, A_C = (Vx' - w Vy, Vy' + w Vx):
-   !>     (M0 + P) A_C + P rr w'           = F_C - c,         c = b - w^2 P r,
+   !>     (M0 + P) A_C + P rr w'           = F - c,           c = b - w^2 P r,
    !>     rr.P A_C     + (J0 + rr.P rr) w' = M_C + T_0 - rr.c.
-   !> The 3x3 matrix is symmetric and positive definite; it is solved by its LDL^T factors.
-   pure subroutine spacecraft_accelerations(n_base, body, p, hinge_mass, pee, pen, pnn, be, bn, moment_0, force, &
+   !> A_C is eliminated with the adjugate adj(M0 + P) = M0 + adj P and the determinant
+   !> d2 = M0^2 + M0 tr P + det P, which gives
+   !>     (J0 d2 + M0 (M0 rr.P rr + det P r^2)) w' = (M_C + T_0) d2 - rr.((M0 P + det P) F + M0 adj(M0 + P) c):
+   !> sums of positive terms on the left, for a light spacecraft on a heavy chain as for the reverse, and two
+   !> divisions that need not wait for each other.
+   pure subroutine spacecraft_accelerations(n_base, body, p, hinge_mass, pee, pen, pnn, det, be, bn, moment_0, force, &
                                             acceleration, ax, ay)
       integer, intent(in) :: n_base               !! 3: free, 0: fixed
       type(spacecraft_body), intent(in) :: body
       real(wp), intent(in) :: p(*)                !! Vx, Vy, w, ... of a free spacecraft
       real(wp), intent(in) :: hinge_mass          !! mass that rides on hinge 0 [kg]
-      real(wp), intent(in) :: pee, pen, pnn       !! P, moving axes [kg]
+      real(wp), intent(in) :: pee, pen, pnn       !! P of the chain, moving axes [kg]
+      real(wp), intent(in) :: det                 !! its determinant [kg^2]
       real(wp), intent(in) :: be, bn              !! b, moving axes [N]
       real(wp), intent(in) :: moment_0            !! T_0 [N m]
       real(wp), intent(in) :: force(3)            !! X_C, Y_C, M_C
       real(wp), intent(inout) :: acceleration(*)  !! first three: Vx', Vy', w'
       real(wp), intent(out) :: ax, ay             !! acceleration of hinge 0, moving axes [m/s^2]
-      real(wp) :: pxx, pyy, cx, cy, px, py, w, w2, m11, m22, m33, l21, l31, l32, d2, d3, f1, f2, f3, w_rate
+      real(wp) :: pxx, pyy, d, d2, inverse, cx, cy, px, py, w, w2, m11, m22, gx, gy, fx, fy, w_rate
 
       ax = 0.0_wp
       ay = 0.0_wp
@@ -41,28 +46,24 @@ contains
       w2 = w*w
       pxx = pee + hinge_mass
       pyy = pnn + hinge_mass
-      associate (x => body%hinge_x, y => body%hinge_y)
+      d = det + hinge_mass*(pee + pnn + hinge_mass)
+      associate (x => body%hinge_x, y => body%hinge_y, mass => body%mass)
+         m11 = mass + pxx
+         m22 = mass + pyy
+         d2 = mass*(mass + (pxx + pyy)) + d
+         inverse = 1.0_wp/d2
          cx = be - w2*(pxx*x + pen*y)
          cy = bn - w2*(pen*x + pyy*y)
          px = pen*x - pxx*y
          py = pyy*x - pen*y
-         m11 = body%mass + pxx
-         m22 = body%mass + pyy
-         m33 = body%inertia + (x*py - y*px)
-         f1 = force(1) - cx
-         f2 = force(2) - cy
-         f3 = force(3) + moment_0 - (x*cy - y*cx)
-
-         l21 = pen/m11
-         l31 = px/m11
-         d2 = m22 - l21*pen
-         l32 = (py - l31*pen)/d2
-         d3 = m33 - l31*px - l32*(py - l31*pen)
-         f2 = f2 - l21*f1
-         f3 = f3 - l31*f1 - l32*f2
-         w_rate = f3/d3
-         ay = f2/d2 - l32*w_rate
-         ax = f1/m11 - l21*ay - l31*w_rate
+         gx = mass*((pxx*force(1) + pen*force(2)) + (m22*cx - pen*cy)) + d*force(1)
+         gy = mass*((pen*force(1) + pyy*force(2)) + (m11*cy - pen*cx)) + d*force(2)
+         w_rate = ((force(3) + moment_0)*d2 - (x*gy - y*gx))/ &
+                  (body%inertia*d2 + mass*(mass*(x*py - y*px) + d*(x*x + y*y)))
+         fx = (force(1) - cx) - px*w_rate
+         fy = (force(2) - cy) - py*w_rate
+         ax = (m22*fx - pen*fy)*inverse
+         ay = (m11*fy - pen*fx)*inverse
 
          acceleration(1) = ax + w*p(2)
          acceleration(2) = ay - w*p(1)

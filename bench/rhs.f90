@@ -1,0 +1,171 @@
+!> Time of one right-hand side: recursive against assembled, against n, and what a scene without some feature
+!> saves. All figures of one run are measured in turns, so that their ratios hold on a noisy machine.
+!>
+!>     bench_rhs [quick]
+program bench_rhs
+   use, intrinsic :: iso_fortran_env, only: compiler_options
+   use rodyn_kinds, only: wp, i8
+   use rodyn_errors, only: error_type
+   use rodyn_case_config, only: case_config, load_config
+   use rodyn_scene, only: scene_type, new_scene
+   use rodyn_motion, only: motion_type, new_motion, initial_state
+   implicit none (type, external)
+
+   !> One measured scene.
+   type :: subject
+      character(len=44) :: name
+      type(motion_type) :: motion
+      real(wp), allocatable :: y(:)
+      integer :: repeats = 0
+      real(wp), allocatable :: nanoseconds(:) !! per call, one a round
+   end type subject
+
+   integer, parameter :: n_rounds = 31
+   integer, parameter :: chain_sizes(*) = [1, 4, 8, 16, 64, 256, 1024, 4096, 10000]
+   type(subject), allocatable :: subjects(:)
+   type(case_config) :: config
+   real(wp) :: reference
+   integer :: i, round
+
+   allocate (subjects(22))
+   i = 0
+   call add('n = 4, consistent, recursive', standard(4))
+   config = standard(4)
+   config%model%kernel = 'assembled'
+   call add('n = 4, consistent, assembled', config)
+   config = standard(4)
+   config%model%formulation = 'paper'
+   call add('n = 4, paper', config)
+   config = standard(4)
+   config%chain%hinge_damping = 0.0_wp
+   call add('n = 4, no dampers', config)
+   config = standard(4)
+   config%chain%kink = 0.1_wp
+   call add('n = 4, kinks', config)
+   config = standard(4)
+   config%loads = [load_config(component='M', value=1500.0_wp)]
+   call add('n = 4, moment on the spacecraft', config)
+   config = standard(4)
+   config%loads = [load_config(target='node', node=4, component='Y', value=10.0_wp)]
+   call add('n = 4, constant force on a node', config)
+   config%loads(1)%law = 'sine_squared'
+   config%loads(1)%rate = 1.0_wp
+   call add('n = 4, varying force on a node', config)
+   config = standard(4)
+   config%spacecraft%motion = 'fixed'
+   call add('n = 4, fixed spacecraft', config)
+   config = standard(4)
+   call add('n = 4, with ledger', config, ledger=.true.)
+   config%model%bending = 'rigid'
+   call add('n = 4, rigid rods', config)
+   config%model%inertia = 'lumped'
+   call add('n = 4, rigid rods, lumped', config)
+   config%model%bending = 'quasistatic'
+   call add('n = 4, quasistatic, lumped', config)
+   do round = 1, size(chain_sizes)
+      call add('', standard(chain_sizes(round)))
+      write (subjects(i)%name, '("chain of ", i0)') chain_sizes(round)
+   end do
+
+   do round = 0, n_rounds
+      do i = 1, size(subjects)
+         call measure(subjects(i), round)
+      end do
+   end do
+
+   write (*, '(2a)') 'compiler options: ', compiler_options()
+   reference = median(subjects(1)%nanoseconds)
+   write (*, '(a44, 3a12)') 'scene', 'ns/call', 'ns/rod', 'ratio'
+   do i = 1, size(subjects)
+      associate (time => median(subjects(i)%nanoseconds), n => subjects(i)%motion%dynamics%scene%n)
+         write (*, '(a44, 2f12.1, f12.2)') subjects(i)%name, time, time/n, time/reference
+      end associate
+   end do
+
+contains
+
+   !> The article's table-1 scene with n rods, without loads.
+   function standard(n) result(c)
+      integer, intent(in) :: n
+      type(case_config) :: c
+      integer :: k
+
+      c%title = ''
+      c%spacecraft%mass = 122.5_wp
+      c%spacecraft%inertia = 122.5_wp*0.98_wp/12.0_wp
+      c%spacecraft%hinge_x = 0.35_wp
+      c%spacecraft%hinge_y = 0.35_wp
+      c%chain%n_rods = n
+      allocate (c%chain%length(n), source=1.5_wp)
+      allocate (c%chain%mass_per_length(n), source=1.6964600329384882_wp)
+      allocate (c%chain%bending_stiffness(n), source=13744.467859455345_wp)
+      allocate (c%chain%node_mass(n), source=0.5_wp)
+      allocate (c%chain%hinge_stiffness(0:n - 1), source=4000.0_wp)
+      allocate (c%chain%hinge_damping(0:n - 1), source=0.01_wp)
+      allocate (c%chain%kink(0:n - 1), source=0.0_wp)
+      allocate (c%initial%alpha(n), c%initial%beta(n), c%initial%alpha_rate(n), c%initial%beta_rate(n), source=0.0_wp)
+      c%initial%phi = [(0.1_wp*sin(0.7_wp*k), k=1, n)]
+      c%initial%phi_rate = [(0.1_wp*cos(0.7_wp*k), k=1, n)]
+      c%initial%omega = 0.3_wp
+      allocate (c%loads(0))
+   end function standard
+
+   subroutine add(name, c, ledger)
+      character(len=*), intent(in) :: name
+      type(case_config), intent(in) :: c
+      logical, intent(in), optional :: ledger
+      type(scene_type) :: scene
+      type(error_type), allocatable :: error
+      logical :: with_ledger
+
+      with_ledger = .false.
+      if (present(ledger)) with_ledger = ledger
+      i = i + 1
+      subjects(i)%name = name
+      call new_scene(scene, c, error)
+      if (allocated(error)) error stop error%message
+      call new_motion(subjects(i)%motion, scene, with_ledger, error)
+      if (allocated(error)) error stop error%message
+      call subjects(i)%motion%dynamics%set_regime(0.0_wp, 1.0_wp)
+      call initial_state(subjects(i)%motion, c%initial, subjects(i)%y)
+      subjects(i)%repeats = max(3, 20000/c%chain%n_rods/merge(10, 1, c%model%kernel == 'assembled'))
+      allocate (subjects(i)%nanoseconds(n_rounds))
+   end subroutine add
+
+   !> Calls in sequence, each starting from a state that depends on the call before (as in an integrator).
+   subroutine measure(item, slot)
+      type(subject), intent(inout) :: item
+      integer, intent(in) :: slot !! 0: warm up
+      real(wp) :: y(size(item%y)), ydot(size(item%y))
+      integer(i8) :: start, finish, rate
+      integer :: j
+      logical :: ok
+
+      y = item%y
+      call system_clock(start, rate)
+      do j = 1, item%repeats
+         call item%motion%rhs(0.3_wp, y, ydot, ok)
+         y(1) = item%y(1) + 1.0e-12_wp*ydot(size(ydot))
+      end do
+      call system_clock(finish)
+      if (.not. ok) error stop 'right-hand side failed'
+      if (slot > 0) item%nanoseconds(slot) = 1.0e9_wp*real(finish - start, wp)/real(rate, wp)/item%repeats
+   end subroutine measure
+
+   real(wp) function median(x)
+      real(wp), intent(in) :: x(:)
+      real(wp) :: sorted(size(x)), swap
+      integer :: a, b
+      sorted = x
+      do a = 2, size(x)
+         do b = a, 2, -1
+            if (sorted(b) >= sorted(b - 1)) exit
+            swap = sorted(b)
+            sorted(b) = sorted(b - 1)
+            sorted(b - 1) = swap
+         end do
+      end do
+      median = sorted((size(x) + 1)/2)
+   end function median
+
+end program bench_rhs
