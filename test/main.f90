@@ -1,12 +1,20 @@
 !> The test program: `tester [filter]` runs every test whose name contains the filter.
 program tester
-   use test_testing, only: suite_tally
+   use test_hdf5_files, only: collect_hdf5_files
+   use test_run_file, only: collect_run_file
+   use test_testing, only: run_suite, suite_tally, unittest
    implicit none (type, external)
    type(suite_tally) :: tally
+   type(unittest), allocatable :: suite(:)
    character(len=200) :: filter
 
    filter = ''
    if (command_argument_count() > 0) call get_command_argument(1, filter)
+
+   call collect_hdf5_files(suite)
+   call run_suite('hdf5_files', suite, tally, trim(filter))
+   call collect_run_file(suite)
+   call run_suite('run_file', suite, tally, trim(filter))
 
    write (*, '(i0, " passed, ", i0, " failed")') tally%passed, tally%failed
    if (tally%failed > 0 .or. tally%passed == 0) error stop 1, quiet=.true.
