@@ -8,7 +8,7 @@ module rodyn_hdf5_files
    use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_funloc, c_funptr, c_int, c_int64_t, c_loc, &
       c_ptr, c_size_t
    use, intrinsic :: iso_fortran_env, only: int32, int64
-   use hdf5, only: hid_t, hsize_t, size_t, h5open_f, h5get_libversion_f, h5eset_auto_f, &
+   use hdf5, only: hid_t, hsize_t, size_t, h5dont_atexit_f, h5open_f, h5get_libversion_f, h5eset_auto_f, &
       h5fcreate_f, h5fopen_f, h5fclose_f, h5fflush_f, h5f_acc_excl_f, h5f_acc_rdonly_f, h5f_close_strong_f, &
       h5f_libver_v18_f, h5f_scope_local_f, &
       h5pcreate_f, h5pclose_f, h5p_file_access_f, h5p_file_create_f, h5p_group_create_f, h5p_dataset_create_f, &
@@ -398,14 +398,18 @@ contains
       integer, intent(in) :: dimension      !! 1: the first of the Fortran array
       character(len=*), intent(in) :: scale !! data set after `make_scale`
       type(error_type), allocatable, intent(out) :: error
+      integer(int64), allocatable :: extent(:)
       integer(hid_t) :: set, scale_set
       integer :: status
 
+      call self%get_shape(name, extent, error)
+      if (allocated(error)) return
       call h5dopen_f(self%id, name, set, status)
       if (self%failed(status, 'h5dopen_f', name, error)) return
       call h5dopen_f(self%id, scale, scale_set, status)
       if (.not. self%failed(status, 'h5dopen_f', scale, error)) then
-         call h5dsattach_scale_f(set, scale_set, dimension, status)
+         ! unlike the rest of the Fortran interface, this call counts dimensions (from 1) in C order
+         call h5dsattach_scale_f(set, scale_set, size(extent) - dimension + 1, status)
          if (self%failed(status, 'h5dsattach_scale_f', name//' to '//scale, error)) continue
          call h5dclose_f(scale_set, status)
       end if
@@ -757,12 +761,15 @@ contains
       call h5aclose_f(attribute, status)
    end subroutine get_number
 
-   !> Start the library once and keep it from printing; its reasons go into our messages.
+   !> Start the library once and keep it from printing; its reasons go into our messages. Nor does it clean up
+   !> when the program ends: all files are closed by then, except one that could not be (full disk), on which
+   !> HDF5 1.10 would crash.
    subroutine start_library()
       logical, save :: started = .false.
       integer :: status
 
       if (started) return
+      call h5dont_atexit_f(status)
       call h5open_f(status)
       call h5eset_auto_f(0, status)
       started = .true.
