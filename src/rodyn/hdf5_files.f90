@@ -1,0 +1,842 @@
+!> HDF5 files as the program needs them; the only module that knows the HDF5 library.
+!>
+!> Objects are addressed by name ('/' is the root, 'solver' a group, 'phi' a data set); no handle but the file's
+!> own lives longer than a call. Shapes are Fortran's: `(rod, time)` here is `(time, rod)` in C and Python.
+!> Files are readable by HDF5 1.8 and later and carry no time stamps: equal contents are equal bytes.
+!> A failed library call becomes a message with the call, the object, the path and the library's own reason.
+module rodyn_hdf5_files
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_funloc, c_funptr, c_int, c_int64_t, c_loc, &
+      c_ptr, c_size_t
+   use, intrinsic :: iso_fortran_env, only: int32, int64
+   use hdf5, only: hid_t, hsize_t, size_t, h5dont_atexit_f, h5open_f, h5get_libversion_f, h5eset_auto_f, &
+      h5fcreate_f, h5fopen_f, h5fclose_f, h5fflush_f, h5f_acc_excl_f, h5f_acc_rdonly_f, h5f_close_strong_f, &
+      h5f_libver_v18_f, h5f_scope_local_f, &
+      h5pcreate_f, h5pclose_f, h5p_file_access_f, h5p_file_create_f, h5p_group_create_f, h5p_dataset_create_f, &
+      h5p_default_f, h5pset_fclose_degree_f, h5pset_libver_bounds_f, h5pset_obj_track_times_f, h5pset_chunk_f, &
+      h5pset_shuffle_f, h5pset_deflate_f, h5pset_fletcher32_f, &
+      h5gcreate_f, h5gclose_f, h5gget_info_by_name_f, h5lexists_f, h5lget_name_by_idx_f, h5_index_name_f, h5_iter_inc_f, &
+      h5screate_f, h5screate_simple_f, h5sclose_f, h5s_scalar_f, h5s_unlimited_f, h5s_select_set_f, &
+      h5sselect_hyperslab_f, h5sget_simple_extent_ndims_f, h5sget_simple_extent_dims_f, &
+      h5tcopy_f, h5tclose_f, h5tset_size_f, h5tset_strpad_f, h5tset_cset_f, h5tget_size_f, h5tis_variable_str_f, &
+      h5t_str_nullpad_f, h5t_cset_utf8_f, h5t_fortran_s1, h5t_ieee_f64le, h5t_std_i32le, h5t_std_i64le, &
+      h5t_native_double, h5kind_to_type, h5_integer_kind, &
+      h5dcreate_f, h5dopen_f, h5dclose_f, h5dwrite_f, h5dread_f, h5dset_extent_f, h5dget_space_f, &
+      h5acreate_by_name_f, h5aopen_by_name_f, h5aexists_by_name_f, h5adelete_by_name_f, h5aclose_f, h5awrite_f, &
+      h5aread_f, h5aget_type_f
+   use h5ds, only: h5dsset_scale_f, h5dsattach_scale_f
+   use rodyn_errors, only: error_type, raise
+   use rodyn_kinds, only: wp
+   implicit none (type, external)
+   private
+   public :: hdf5_file, hdf5_version
+
+   integer, parameter :: max_rank = 7
+   integer, parameter :: name_length = 256 !! longest member name `members` returns whole
+
+   !> An open file. Leaving the scope closes it, silently: call `close` to hear of failures.
+   type :: hdf5_file
+      character(len=:), allocatable :: path
+      integer(hid_t), private :: id = -1_hid_t
+   contains
+      procedure :: create
+      procedure :: open
+      procedure :: is_open
+      procedure :: flush => flush_file
+      procedure :: close => close_file
+      procedure :: create_group
+      procedure :: create_series
+      generic :: append => append_1, append_2
+      generic :: write => write_integer_1, write_real_1, write_real_2, write_real_3
+      procedure :: make_scale
+      procedure :: attach_scale
+      generic :: put_attribute => put_text, put_real, put_int32, put_int64, put_logical
+      procedure :: exists
+      procedure :: has_attribute
+      procedure :: members
+      procedure :: get_shape
+      generic :: read => read_integer_1, read_real_1, read_real_2, read_real_3
+      generic :: get_attribute => get_text, get_real, get_int32, get_int64, get_logical
+      procedure, private :: failed
+      procedure, private :: append_1, append_2, append_block
+      procedure, private :: write_integer_1, write_real_1, write_real_2, write_real_3, write_whole
+      procedure, private :: put_text, put_real, put_int32, put_int64, put_logical, put_number
+      procedure, private :: read_integer_1, read_real_1, read_real_2, read_real_3, read_whole
+      procedure, private :: get_text, get_real, get_int32, get_int64, get_logical, get_number
+      final :: finalize
+   end type hdf5_file
+
+   !> H5E_error2_t of the C library: one record of its error stack.
+   type, bind(c) :: error_record
+      integer(c_int64_t) :: class_id
+      integer(c_int64_t) :: major
+      integer(c_int64_t) :: minor
+      integer(c_int) :: line
+      type(c_ptr) :: function_name
+      type(c_ptr) :: file_name
+      type(c_ptr) :: description
+   end type error_record
+
+   interface
+      ! The Fortran interface can only print the error stack; the reason is wanted as text.
+      function h5ewalk2(stack, direction, callback, client_data) result(status) bind(c, name='H5Ewalk2')
+         import :: c_funptr, c_int, c_int64_t, c_ptr
+         implicit none (type, external)
+         integer(c_int64_t), value :: stack
+         integer(c_int), value :: direction
+         type(c_funptr), value :: callback
+         type(c_ptr), value :: client_data
+         integer(c_int) :: status
+      end function h5ewalk2
+
+      function c_strlen(text) result(length) bind(c, name='strlen')
+         import :: c_ptr, c_size_t
+         implicit none (type, external)
+         type(c_ptr), value :: text
+         integer(c_size_t) :: length
+      end function c_strlen
+   end interface
+
+contains
+
+   !> Version of the library in use, '1.10.8'.
+   function hdf5_version() result(text)
+      character(len=:), allocatable :: text
+      character(len=32) :: buffer
+      integer :: major, minor, release, status
+
+      call h5get_libversion_f(major, minor, release, status)
+      write (buffer, '(i0, ".", i0, ".", i0)') major, minor, release
+      text = trim(buffer)
+   end function hdf5_version
+
+   !> Make a new file; an existing one is never touched, that is an error.
+   subroutine create(self, path, error)
+      class(hdf5_file), intent(inout) :: self
+      character(len=*), intent(in) :: path
+      type(error_type), allocatable, intent(out) :: error
+      integer(hid_t) :: access_list, creation_list
+      integer :: status
+
+      call start_library()
+      self%path = path
+      call new_access_list(access_list)
+      call h5pcreate_f(h5p_file_create_f, creation_list, status)
+      call h5pset_obj_track_times_f(creation_list, .false., status)
+      call h5fcreate_f(path, h5f_acc_excl_f, self%id, status, creation_list, access_list)
+      if (self%failed(status, 'h5fcreate_f', '/', error)) self%id = -1_hid_t
+      call h5pclose_f(creation_list, status)
+      call h5pclose_f(access_list, status)
+   end subroutine create
+
+   !> Open an existing file for reading.
+   subroutine open(self, path, error)
+      class(hdf5_file), intent(inout) :: self
+      character(len=*), intent(in) :: path
+      type(error_type), allocatable, intent(out) :: error
+      integer(hid_t) :: access_list
+      integer :: status
+
+      call start_library()
+      self%path = path
+      call new_access_list(access_list)
+      call h5fopen_f(path, h5f_acc_rdonly_f, self%id, status, access_list)
+      if (self%failed(status, 'h5fopen_f', '/', error)) self%id = -1_hid_t
+      call h5pclose_f(access_list, status)
+   end subroutine open
+
+   !> Is a file open?
+   pure function is_open(self)
+      class(hdf5_file), intent(in) :: self
+      logical :: is_open
+      is_open = self%id >= 0_hid_t
+   end function is_open
+
+   !> Hand everything written so far to the operating system.
+   subroutine flush_file(self, error)
+      class(hdf5_file), intent(in) :: self
+      type(error_type), allocatable, intent(out) :: error
+      integer :: status
+
+      call h5fflush_f(self%id, h5f_scope_local_f, status)
+      if (self%failed(status, 'h5fflush_f', '/', error)) return
+   end subroutine flush_file
+
+   !> Close the file and whatever of it is still open; nothing happens if it is closed already.
+   subroutine close_file(self, error)
+      class(hdf5_file), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      integer :: status
+
+      if (.not. self%is_open()) return
+      call h5fclose_f(self%id, status)
+      self%id = -1_hid_t
+      if (self%failed(status, 'h5fclose_f', '/', error)) return
+   end subroutine close_file
+
+   impure elemental subroutine finalize(self)
+      type(hdf5_file), intent(inout) :: self
+      type(error_type), allocatable :: error
+      call self%close(error)
+   end subroutine finalize
+
+   !> Make a group.
+   subroutine create_group(self, name, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: name
+      type(error_type), allocatable, intent(out) :: error
+      integer(hid_t) :: group, creation_list
+      integer :: status
+
+      call h5pcreate_f(h5p_group_create_f, creation_list, status)
+      call h5pset_obj_track_times_f(creation_list, .false., status)
+      call h5gcreate_f(self%id, name, group, status, gcpl_id=creation_list)
+      if (.not. self%failed(status, 'h5gcreate_f', name, error)) call h5gclose_f(group, status)
+      call h5pclose_f(creation_list, status)
+   end subroutine create_group
+
+   !> Make an empty real data set that grows along its last dimension, time. It is chunked, compressed and
+   !> checksummed; blocks of `chunk_rows` rows are written fastest.
+   subroutine create_series(self, name, row_shape, chunk_rows, compression, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer, intent(in) :: row_shape(:) !! shape of one row; empty: one number per time
+      integer, intent(in) :: chunk_rows   !! rows per chunk, >= 1
+      integer, intent(in) :: compression  !! gzip level, 0..9
+      type(error_type), allocatable, intent(out) :: error
+      integer(hsize_t) :: extent(size(row_shape) + 1)
+      integer(hid_t) :: set
+      integer :: status
+
+      extent = int([row_shape, 0], hsize_t)
+      call new_dataset(self, name, h5t_ieee_f64le, extent, int([row_shape, chunk_rows], hsize_t), .true., compression, &
+         set, error)
+      if (allocated(error)) return
+      call h5dclose_f(set, status)
+      if (self%failed(status, 'h5dclose_f', name, error)) return
+   end subroutine create_series
+
+   !> Append numbers, one per time, to a series.
+   subroutine append_1(self, name, values, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: name
+      real(wp), intent(in), contiguous, target :: values(:) !! (time)
+      type(error_type), allocatable, intent(out) :: error
+      if (size(values) == 0) return
+      call self%append_block(name, c_loc(values), int(shape(values), hsize_t), error)
+   end subroutine append_1
+
+   !> Append rows to a series.
+   subroutine append_2(self, name, values, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: name
+      real(wp), intent(in), contiguous, target :: values(:, :) !! (rod, time)
+      type(error_type), allocatable, intent(out) :: error
+      if (size(values) == 0) return
+      call self%append_block(name, c_loc(values), int(shape(values), hsize_t), error)
+   end subroutine append_2
+
+   !> Extend a data set along its last dimension and fill the new part.
+   subroutine append_block(self, name, values, counts, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: name
+      type(c_ptr), intent(in) :: values         !! real(wp), contiguous
+      integer(hsize_t), intent(in) :: counts(:) !! shape of values
+      type(error_type), allocatable, intent(out) :: error
+      integer(hid_t) :: set, file_space, memory_space
+      integer(hsize_t) :: extent(max_rank), most(max_rank), start(size(counts))
+      integer :: rank, status
+
+      rank = size(counts)
+      call h5dopen_f(self%id, name, set, status)
+      if (self%failed(status, 'h5dopen_f', name, error)) return
+      work: block
+         call h5dget_space_f(set, file_space, status)
+         if (self%failed(status, 'h5dget_space_f', name, error)) exit work
+         call h5sget_simple_extent_dims_f(file_space, extent, most, status)
+         call h5sclose_f(file_space, status)
+         start = 0_hsize_t
+         start(rank) = extent(rank)
+         call h5dset_extent_f(set, [counts(:rank - 1), start(rank) + counts(rank)], status)
+         if (self%failed(status, 'h5dset_extent_f', name, error)) exit work
+         call h5dget_space_f(set, file_space, status)
+         if (self%failed(status, 'h5dget_space_f', name, error)) exit work
+         call h5sselect_hyperslab_f(file_space, h5s_select_set_f, start, counts, status)
+         call h5screate_simple_f(rank, counts, memory_space, status)
+         call h5dwrite_f(set, h5t_native_double, values, status, memory_space, file_space)
+         if (self%failed(status, 'h5dwrite_f', name, error)) continue
+         call h5sclose_f(memory_space, status)
+         call h5sclose_f(file_space, status)
+      end block work
+      call h5dclose_f(set, status)
+      if (.not. allocated(error)) then
+         if (self%failed(status, 'h5dclose_f', name, error)) return
+      end if
+   end subroutine append_block
+
+   !> Write a whole data set of fixed shape, as one chunk with checksum.
+   subroutine write_integer_1(self, name, values, compression, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer, intent(in), contiguous, target :: values(:)
+      integer, intent(in) :: compression !! gzip level, 0..9
+      type(error_type), allocatable, intent(out) :: error
+      call self%write_whole(name, h5t_std_i32le, h5kind_to_type(kind(values), h5_integer_kind), c_loc(values), &
+         int(shape(values), hsize_t), compression, error)
+   end subroutine write_integer_1
+
+   subroutine write_real_1(self, name, values, compression, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: name
+      real(wp), intent(in), contiguous, target :: values(:)
+      integer, intent(in) :: compression !! gzip level, 0..9
+      type(error_type), allocatable, intent(out) :: error
+      call self%write_whole(name, h5t_ieee_f64le, h5t_native_double, c_loc(values), int(shape(values), hsize_t), &
+         compression, error)
+   end subroutine write_real_1
+
+   subroutine write_real_2(self, name, values, compression, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: name
+      real(wp), intent(in), contiguous, target :: values(:, :)
+      integer, intent(in) :: compression !! gzip level, 0..9
+      type(error_type), allocatable, intent(out) :: error
+      call self%write_whole(name, h5t_ieee_f64le, h5t_native_double, c_loc(values), int(shape(values), hsize_t), &
+         compression, error)
+   end subroutine write_real_2
+
+   subroutine write_real_3(self, name, values, compression, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: name
+      real(wp), intent(in), contiguous, target :: values(:, :, :)
+      integer, intent(in) :: compression !! gzip level, 0..9
+      type(error_type), allocatable, intent(out) :: error
+      call self%write_whole(name, h5t_ieee_f64le, h5t_native_double, c_loc(values), int(shape(values), hsize_t), &
+         compression, error)
+   end subroutine write_real_3
+
+   subroutine write_whole(self, name, file_type, memory_type, values, extent, compression, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer(hid_t), intent(in) :: file_type, memory_type
+      type(c_ptr), intent(in) :: values
+      integer(hsize_t), intent(in) :: extent(:)
+      integer, intent(in) :: compression
+      type(error_type), allocatable, intent(out) :: error
+      integer(hid_t) :: set
+      integer :: status
+
+      call new_dataset(self, name, file_type, extent, max(extent, 1_hsize_t), .false., compression, set, error)
+      if (allocated(error)) return
+      if (product(extent) > 0_hsize_t) then
+         call h5dwrite_f(set, memory_type, values, status)
+         if (self%failed(status, 'h5dwrite_f', name, error)) continue
+      end if
+      call h5dclose_f(set, status)
+      if (.not. allocated(error)) then
+         if (self%failed(status, 'h5dclose_f', name, error)) return
+      end if
+   end subroutine write_whole
+
+   !> Make a data set with the filters of every data set: shuffle and gzip (level > 0), then a checksum.
+   subroutine new_dataset(self, name, file_type, extent, chunk, growing, compression, set, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer(hid_t), intent(in) :: file_type
+      integer(hsize_t), intent(in) :: extent(:), chunk(:)
+      logical, intent(in) :: growing     !! the last dimension has no bound
+      integer, intent(in) :: compression !! gzip level, 0..9
+      integer(hid_t), intent(out) :: set !! open; the caller closes it
+      type(error_type), allocatable, intent(out) :: error
+      integer(hsize_t) :: most(size(extent))
+      integer(hid_t) :: space, creation_list
+      integer :: status
+
+      set = -1_hid_t
+      most = extent
+      if (growing) most(size(most)) = h5s_unlimited_f
+      call h5screate_simple_f(size(extent), extent, space, status, most)
+      if (self%failed(status, 'h5screate_simple_f', name, error)) return
+      call h5pcreate_f(h5p_dataset_create_f, creation_list, status)
+      work: block
+         call h5pset_obj_track_times_f(creation_list, .false., status)
+         call h5pset_chunk_f(creation_list, size(chunk), chunk, status)
+         if (self%failed(status, 'h5pset_chunk_f', name, error)) exit work
+         if (compression > 0) then
+            call h5pset_shuffle_f(creation_list, status)
+            if (self%failed(status, 'h5pset_shuffle_f', name, error)) exit work
+            call h5pset_deflate_f(creation_list, compression, status)
+            if (self%failed(status, 'h5pset_deflate_f', name, error)) exit work
+         end if
+         call h5pset_fletcher32_f(creation_list, status)
+         if (self%failed(status, 'h5pset_fletcher32_f', name, error)) exit work
+         call h5dcreate_f(self%id, name, file_type, space, set, status, dcpl_id=creation_list)
+         if (self%failed(status, 'h5dcreate_f', name, error)) exit work
+      end block work
+      call h5pclose_f(creation_list, status)
+      call h5sclose_f(space, status)
+   end subroutine new_dataset
+
+   !> Turn a data set into a dimension scale, the coordinate of a dimension of the same name.
+   subroutine make_scale(self, name, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: name
+      type(error_type), allocatable, intent(out) :: error
+      integer(hid_t) :: set
+      integer :: status
+
+      call h5dopen_f(self%id, name, set, status)
+      if (self%failed(status, 'h5dopen_f', name, error)) return
+      call h5dsset_scale_f(set, status, name)
+      if (self%failed(status, 'h5dsset_scale_f', name, error)) continue
+      call h5dclose_f(set, status)
+   end subroutine make_scale
+
+   !> Attach a dimension scale to one dimension of a data set.
+   subroutine attach_scale(self, name, dimension, scale, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer, intent(in) :: dimension      !! 1: the first of the Fortran array
+      character(len=*), intent(in) :: scale !! data set after `make_scale`
+      type(error_type), allocatable, intent(out) :: error
+      integer(int64), allocatable :: extent(:)
+      integer(hid_t) :: set, scale_set
+      integer :: status
+
+      call self%get_shape(name, extent, error)
+      if (allocated(error)) return
+      call h5dopen_f(self%id, name, set, status)
+      if (self%failed(status, 'h5dopen_f', name, error)) return
+      call h5dopen_f(self%id, scale, scale_set, status)
+      if (.not. self%failed(status, 'h5dopen_f', scale, error)) then
+         ! unlike the rest of the Fortran interface, this call counts dimensions (from 1) in C order
+         call h5dsattach_scale_f(set, scale_set, size(extent) - dimension + 1, status)
+         if (self%failed(status, 'h5dsattach_scale_f', name//' to '//scale, error)) continue
+         call h5dclose_f(scale_set, status)
+      end if
+      call h5dclose_f(set, status)
+   end subroutine attach_scale
+
+   !> Write a text attribute: scalar, fixed length, UTF-8, padded with nulls; of any length. An empty text
+   !> is one null. An attribute of that name is replaced.
+   subroutine put_text(self, object, name, value, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: object !! '/' for the root
+      character(len=*), intent(in) :: name
+      character(len=*), intent(in) :: value
+      type(error_type), allocatable, intent(out) :: error
+      integer(hid_t) :: text_type, attribute
+      integer :: status
+
+      call h5tcopy_f(h5t_fortran_s1, text_type, status)
+      if (self%failed(status, 'h5tcopy_f', object//'@'//name, error)) return
+      call h5tset_size_f(text_type, int(max(1, len(value)), size_t), status)
+      call h5tset_strpad_f(text_type, h5t_str_nullpad_f, status)
+      call h5tset_cset_f(text_type, h5t_cset_utf8_f, status)
+      call new_attribute(self, object, name, text_type, attribute, error)
+      if (.not. allocated(error)) then
+         if (len(value) > 0) then
+            call h5awrite_f(attribute, text_type, value, [1_hsize_t], status)
+         else
+            call h5awrite_f(attribute, text_type, achar(0), [1_hsize_t], status)
+         end if
+         if (self%failed(status, 'h5awrite_f', object//'@'//name, error)) continue
+         call h5aclose_f(attribute, status)
+      end if
+      call h5tclose_f(text_type, status)
+   end subroutine put_text
+
+   subroutine put_real(self, object, name, value, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: object, name
+      real(wp), intent(in), target :: value
+      type(error_type), allocatable, intent(out) :: error
+      call self%put_number(object, name, h5t_ieee_f64le, h5t_native_double, c_loc(value), error)
+   end subroutine put_real
+
+   subroutine put_int32(self, object, name, value, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: object, name
+      integer(int32), intent(in), target :: value
+      type(error_type), allocatable, intent(out) :: error
+      call self%put_number(object, name, h5t_std_i32le, h5kind_to_type(int32, h5_integer_kind), c_loc(value), error)
+   end subroutine put_int32
+
+   subroutine put_int64(self, object, name, value, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: object, name
+      integer(int64), intent(in), target :: value
+      type(error_type), allocatable, intent(out) :: error
+      call self%put_number(object, name, h5t_std_i64le, h5kind_to_type(int64, h5_integer_kind), c_loc(value), error)
+   end subroutine put_int64
+
+   !> Write a logical as an integer, 0 or 1.
+   subroutine put_logical(self, object, name, value, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: object, name
+      logical, intent(in) :: value
+      type(error_type), allocatable, intent(out) :: error
+      call self%put_int32(object, name, merge(1_int32, 0_int32, value), error)
+   end subroutine put_logical
+
+   subroutine put_number(self, object, name, file_type, memory_type, value, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: object, name
+      integer(hid_t), intent(in) :: file_type, memory_type
+      type(c_ptr), intent(in) :: value
+      type(error_type), allocatable, intent(out) :: error
+      integer(hid_t) :: attribute
+      integer :: status
+
+      call new_attribute(self, object, name, file_type, attribute, error)
+      if (allocated(error)) return
+      call h5awrite_f(attribute, memory_type, value, status)
+      if (self%failed(status, 'h5awrite_f', object//'@'//name, error)) continue
+      call h5aclose_f(attribute, status)
+   end subroutine put_number
+
+   !> Make a scalar attribute, in the place of one with that name.
+   subroutine new_attribute(self, object, name, file_type, attribute, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: object, name
+      integer(hid_t), intent(in) :: file_type
+      integer(hid_t), intent(out) :: attribute !! open; the caller closes it
+      type(error_type), allocatable, intent(out) :: error
+      integer(hid_t) :: space
+      integer :: status
+      logical :: present_already
+
+      attribute = -1_hid_t
+      call h5aexists_by_name_f(self%id, object, name, present_already, status)
+      if (self%failed(status, 'h5aexists_by_name_f', object//'@'//name, error)) return
+      if (present_already) then
+         call h5adelete_by_name_f(self%id, object, name, status)
+         if (self%failed(status, 'h5adelete_by_name_f', object//'@'//name, error)) return
+      end if
+      call h5screate_f(h5s_scalar_f, space, status)
+      if (self%failed(status, 'h5screate_f', object//'@'//name, error)) return
+      call h5acreate_by_name_f(self%id, object, name, file_type, space, attribute, status)
+      if (self%failed(status, 'h5acreate_by_name_f', object//'@'//name, error)) continue
+      call h5sclose_f(space, status)
+   end subroutine new_attribute
+
+   !> Does a group or data set of this name exist? Groups on the way to it must exist.
+   function exists(self, name)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: name
+      logical :: exists
+      integer :: status
+
+      call h5lexists_f(self%id, name, exists, status)
+      if (status /= 0) exists = .false.
+   end function exists
+
+   !> Does an object have an attribute of this name?
+   function has_attribute(self, object, name)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: object !! '/' for the root
+      character(len=*), intent(in) :: name
+      logical :: has_attribute
+      integer :: status
+
+      call h5aexists_by_name_f(self%id, object, name, has_attribute, status)
+      if (status /= 0) has_attribute = .false.
+   end function has_attribute
+
+   !> Names of the groups and data sets in a group, sorted.
+   subroutine members(self, group, names, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: group !! '/' for the root
+      character(len=name_length), allocatable, intent(out) :: names(:)
+      type(error_type), allocatable, intent(out) :: error
+      integer :: storage_type, n_links, max_order, i, status
+
+      call h5gget_info_by_name_f(self%id, group, storage_type, n_links, max_order, status)
+      if (self%failed(status, 'h5gget_info_by_name_f', group, error)) return
+      allocate (names(n_links))
+      do i = 1, n_links
+         call h5lget_name_by_idx_f(self%id, group, h5_index_name_f, h5_iter_inc_f, int(i - 1, hsize_t), names(i), status)
+         if (self%failed(status, 'h5lget_name_by_idx_f', group, error)) return
+      end do
+   end subroutine members
+
+   !> Shape of a data set as a Fortran array.
+   subroutine get_shape(self, name, extent, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer(int64), allocatable, intent(out) :: extent(:) !! empty for a scalar
+      type(error_type), allocatable, intent(out) :: error
+      integer(hid_t) :: set, space
+      integer(hsize_t) :: sizes(max_rank), most(max_rank)
+      integer :: rank, status
+
+      call h5dopen_f(self%id, name, set, status)
+      if (self%failed(status, 'h5dopen_f', name, error)) return
+      call h5dget_space_f(set, space, status)
+      if (.not. self%failed(status, 'h5dget_space_f', name, error)) then
+         call h5sget_simple_extent_ndims_f(space, rank, status)
+         if (rank > max_rank) then
+            call raise(error, "'"//name//"' of "//self%path//': more dimensions than this program handles')
+         else
+            call h5sget_simple_extent_dims_f(space, sizes, most, status)
+            extent = int(sizes(:rank), int64)
+         end if
+         call h5sclose_f(space, status)
+      end if
+      call h5dclose_f(set, status)
+   end subroutine get_shape
+
+   !> Read a whole data set. Its rank must be that of `values`; its type is converted.
+   subroutine read_integer_1(self, name, values, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer, allocatable, target, intent(out) :: values(:)
+      type(error_type), allocatable, intent(out) :: error
+      integer(int64), allocatable :: extent(:)
+
+      call shape_of_rank(self, name, 1, extent, error)
+      if (allocated(error)) return
+      allocate (values(extent(1)))
+      if (size(values) > 0) call self%read_whole(name, h5kind_to_type(kind(values), h5_integer_kind), c_loc(values), error)
+   end subroutine read_integer_1
+
+   subroutine read_real_1(self, name, values, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: name
+      real(wp), allocatable, target, intent(out) :: values(:)
+      type(error_type), allocatable, intent(out) :: error
+      integer(int64), allocatable :: extent(:)
+
+      call shape_of_rank(self, name, 1, extent, error)
+      if (allocated(error)) return
+      allocate (values(extent(1)))
+      if (size(values) > 0) call self%read_whole(name, h5t_native_double, c_loc(values), error)
+   end subroutine read_real_1
+
+   subroutine read_real_2(self, name, values, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: name
+      real(wp), allocatable, target, intent(out) :: values(:, :)
+      type(error_type), allocatable, intent(out) :: error
+      integer(int64), allocatable :: extent(:)
+
+      call shape_of_rank(self, name, 2, extent, error)
+      if (allocated(error)) return
+      allocate (values(extent(1), extent(2)))
+      if (size(values) > 0) call self%read_whole(name, h5t_native_double, c_loc(values), error)
+   end subroutine read_real_2
+
+   subroutine read_real_3(self, name, values, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: name
+      real(wp), allocatable, target, intent(out) :: values(:, :, :)
+      type(error_type), allocatable, intent(out) :: error
+      integer(int64), allocatable :: extent(:)
+
+      call shape_of_rank(self, name, 3, extent, error)
+      if (allocated(error)) return
+      allocate (values(extent(1), extent(2), extent(3)))
+      if (size(values) > 0) call self%read_whole(name, h5t_native_double, c_loc(values), error)
+   end subroutine read_real_3
+
+   subroutine shape_of_rank(self, name, rank, extent, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer, intent(in) :: rank
+      integer(int64), allocatable, intent(out) :: extent(:) !! (rank)
+      type(error_type), allocatable, intent(out) :: error
+      character(len=60) :: numbers
+
+      call self%get_shape(name, extent, error)
+      if (allocated(error)) return
+      if (size(extent) == rank) return
+      write (numbers, '(": ", i0, " dimension(s), expected ", i0)') size(extent), rank
+      call raise(error, "'"//name//"' of "//self%path//trim(numbers))
+   end subroutine shape_of_rank
+
+   subroutine read_whole(self, name, memory_type, values, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer(hid_t), intent(in) :: memory_type
+      type(c_ptr), intent(in) :: values
+      type(error_type), allocatable, intent(out) :: error
+      type(c_ptr) :: buffer
+      integer(hid_t) :: set
+      integer :: status
+
+      buffer = values
+      call h5dopen_f(self%id, name, set, status)
+      if (self%failed(status, 'h5dopen_f', name, error)) return
+      call h5dread_f(set, memory_type, buffer, status)
+      if (self%failed(status, 'h5dread_f', name, error)) continue
+      call h5dclose_f(set, status)
+   end subroutine read_whole
+
+   !> Read a text attribute of fixed length, without its padding nulls.
+   subroutine get_text(self, object, name, value, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: object !! '/' for the root
+      character(len=*), intent(in) :: name
+      character(len=:), allocatable, intent(out) :: value
+      type(error_type), allocatable, intent(out) :: error
+      integer(hid_t) :: attribute, text_type
+      integer(size_t) :: length
+      integer :: status, used
+      logical :: variable
+
+      call h5aopen_by_name_f(self%id, object, name, attribute, status)
+      if (self%failed(status, 'h5aopen_by_name_f', object//'@'//name, error)) return
+      work: block
+         call h5aget_type_f(attribute, text_type, status)
+         if (self%failed(status, 'h5aget_type_f', object//'@'//name, error)) exit work
+         call h5tis_variable_str_f(text_type, variable, status)
+         call h5tget_size_f(text_type, length, status)
+         if (variable) then
+            call raise(error, "'"//object//'@'//name//"' of "//self%path//' is not a text of fixed length')
+         else
+            allocate (character(len=length) :: value)
+            call h5aread_f(attribute, text_type, value, [1_hsize_t], status)
+            if (self%failed(status, 'h5aread_f', object//'@'//name, error)) continue
+         end if
+         call h5tclose_f(text_type, status)
+      end block work
+      call h5aclose_f(attribute, status)
+      if (allocated(error)) return
+      used = verify(value, achar(0), back=.true.)
+      value = value(:used)
+   end subroutine get_text
+
+   subroutine get_real(self, object, name, value, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: object, name
+      real(wp), target, intent(out) :: value
+      type(error_type), allocatable, intent(out) :: error
+      value = 0.0_wp
+      call self%get_number(object, name, h5t_native_double, c_loc(value), error)
+   end subroutine get_real
+
+   subroutine get_int32(self, object, name, value, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: object, name
+      integer(int32), target, intent(out) :: value
+      type(error_type), allocatable, intent(out) :: error
+      value = 0_int32
+      call self%get_number(object, name, h5kind_to_type(int32, h5_integer_kind), c_loc(value), error)
+   end subroutine get_int32
+
+   subroutine get_int64(self, object, name, value, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: object, name
+      integer(int64), target, intent(out) :: value
+      type(error_type), allocatable, intent(out) :: error
+      value = 0_int64
+      call self%get_number(object, name, h5kind_to_type(int64, h5_integer_kind), c_loc(value), error)
+   end subroutine get_int64
+
+   !> Read a logical that was written as an integer; anything but 0 is true.
+   subroutine get_logical(self, object, name, value, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: object, name
+      logical, intent(out) :: value
+      type(error_type), allocatable, intent(out) :: error
+      integer(int32) :: number
+      call self%get_int32(object, name, number, error)
+      value = number /= 0_int32
+   end subroutine get_logical
+
+   subroutine get_number(self, object, name, memory_type, value, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: object, name
+      integer(hid_t), intent(in) :: memory_type
+      type(c_ptr), intent(in) :: value
+      type(error_type), allocatable, intent(out) :: error
+      type(c_ptr) :: buffer
+      integer(hid_t) :: attribute
+      integer :: status
+
+      buffer = value
+      call h5aopen_by_name_f(self%id, object, name, attribute, status)
+      if (self%failed(status, 'h5aopen_by_name_f', object//'@'//name, error)) return
+      call h5aread_f(attribute, memory_type, buffer, status)
+      if (self%failed(status, 'h5aread_f', object//'@'//name, error)) continue
+      call h5aclose_f(attribute, status)
+   end subroutine get_number
+
+   !> Start the library once and keep it from printing; its reasons go into our messages. Nor does it clean up
+   !> when the program ends: all files are closed by then, except one that could not be (full disk), on which
+   !> HDF5 1.10 would crash.
+   subroutine start_library()
+      logical, save :: started = .false.
+      integer :: status
+
+      if (started) return
+      call h5dont_atexit_f(status)
+      call h5open_f(status)
+      call h5eset_auto_f(0, status)
+      started = .true.
+   end subroutine start_library
+
+   !> Access properties of every file: format of HDF5 1.8 (attributes beyond 64 KiB, checksummed metadata), and
+   !> closing the file closes all that failed calls left open.
+   subroutine new_access_list(access_list)
+      integer(hid_t), intent(out) :: access_list
+      integer :: status
+
+      call h5pcreate_f(h5p_file_access_f, access_list, status)
+      call h5pset_libver_bounds_f(access_list, h5f_libver_v18_f, h5f_libver_v18_f, status)
+      call h5pset_fclose_degree_f(access_list, h5f_close_strong_f, status)
+   end subroutine new_access_list
+
+   !> Did a library call fail? If so, `error` names the call, the object, the path and the reason. To be called
+   !> right after the call, before the library forgets why.
+   function failed(self, status, call_name, object, error)
+      class(hdf5_file), intent(in) :: self
+      integer, intent(in) :: status !! the call's return code
+      character(len=*), intent(in) :: call_name
+      character(len=*), intent(in) :: object
+      type(error_type), allocatable, intent(inout) :: error !! allocated: it failed
+      logical :: failed
+
+      failed = status < 0
+      if (.not. failed) return
+      call raise(error, self%path//": HDF5 call "//call_name//" failed on '"//object//"': "//library_reason())
+   end function failed
+
+   !> The library's own words for its last failure.
+   function library_reason() result(text)
+      character(len=:), allocatable :: text
+      character(len=*), parameter :: mark = "error message = '"
+      character(kind=c_char, len=512), target :: buffer
+      integer(c_int) :: status
+      integer :: first, length
+
+      buffer = ' '
+      status = h5ewalk2(0_c_int64_t, 0_c_int, c_funloc(keep_first_record), c_loc(buffer))
+      text = trim(buffer)
+      if (len(text) == 0) text = 'no reason given'
+
+      ! of a failed system call only its reason is of use
+      first = index(text, mark)
+      if (first == 0) return
+      first = first + len(mark)
+      length = index(text(first:), "'") - 1
+      if (length > 0) text = text(first:first + length - 1)
+   end function library_reason
+
+   !> Copy the description of the innermost record of the error stack and end the walk.
+   function keep_first_record(position, record, client_data) result(stop_here) bind(c)
+      integer(c_int), value :: position        !! 0 for the innermost
+      type(error_record), intent(in) :: record
+      type(c_ptr), value :: client_data        !! character(len=512)
+      integer(c_int) :: stop_here
+      character(kind=c_char), pointer :: from(:), to(:)
+      integer :: length
+
+      stop_here = 1_c_int
+      if (position > 0 .or. .not. c_associated(record%description)) return
+      length = int(min(c_strlen(record%description), 512_c_size_t))
+      call c_f_pointer(record%description, from, [length])
+      call c_f_pointer(client_data, to, [length])
+      to = from
+   end function keep_first_record
+
+end module rodyn_hdf5_files

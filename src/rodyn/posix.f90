@@ -1,0 +1,325 @@
+!> The few POSIX calls the program needs; the only module that knows the C library (Linux: glibc or musl).
+!>
+!> Calls that can fail return the reason as text, empty on success, so that callers word their own messages.
+module rodyn_posix
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_funptr, c_int, c_intptr_t, &
+      c_long, c_null_char, c_null_funptr, c_ptr, c_size_t
+   implicit none (type, external)
+   private
+   public :: process_id, host_name, utc_now
+   public :: path_exists, is_directory, is_writable, parent_directory
+   public :: sync_path, rename_over, rename_new, remove_file
+   public :: ignore_file_size_signal
+
+   integer(c_int), parameter :: f_ok = 0, w_ok = 2, x_ok = 1               ! <unistd.h>
+   integer(c_int), parameter :: o_rdonly = 0                               ! <fcntl.h>
+   integer(c_int), parameter :: eperm = 1, eexist = 17, emlink = 31, enosys = 38, enotsup = 95 ! <errno.h>, Linux
+   integer(c_int), parameter :: sigxfsz = 25                               ! <signal.h>, Linux
+   integer(c_intptr_t), parameter :: sig_ign = 1_c_intptr_t                ! <signal.h>
+
+   interface
+      function posix_getpid() result(pid) bind(c, name='getpid')
+         import :: c_int
+         implicit none (type, external)
+         integer(c_int) :: pid
+      end function posix_getpid
+
+      function posix_gethostname(name, length) result(status) bind(c, name='gethostname')
+         import :: c_char, c_int, c_size_t
+         implicit none (type, external)
+         character(kind=c_char), intent(out) :: name(*)
+         integer(c_size_t), value :: length
+         integer(c_int) :: status
+      end function posix_gethostname
+
+      ! variadic in C; without its third argument the call is an ordinary one
+      function posix_open(path, flags) result(descriptor) bind(c, name='open')
+         import :: c_char, c_int
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_int), value :: flags
+         integer(c_int) :: descriptor
+      end function posix_open
+
+      function posix_close(descriptor) result(status) bind(c, name='close')
+         import :: c_int
+         implicit none (type, external)
+         integer(c_int), value :: descriptor
+         integer(c_int) :: status
+      end function posix_close
+
+      function posix_fsync(descriptor) result(status) bind(c, name='fsync')
+         import :: c_int
+         implicit none (type, external)
+         integer(c_int), value :: descriptor
+         integer(c_int) :: status
+      end function posix_fsync
+
+      function posix_access(path, mode) result(status) bind(c, name='access')
+         import :: c_char, c_int
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_int), value :: mode
+         integer(c_int) :: status
+      end function posix_access
+
+      function posix_opendir(path) result(stream) bind(c, name='opendir')
+         import :: c_char, c_ptr
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+         type(c_ptr) :: stream
+      end function posix_opendir
+
+      function posix_closedir(stream) result(status) bind(c, name='closedir')
+         import :: c_int, c_ptr
+         implicit none (type, external)
+         type(c_ptr), value :: stream
+         integer(c_int) :: status
+      end function posix_closedir
+
+      function posix_rename(old, new) result(status) bind(c, name='rename')
+         import :: c_char, c_int
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: old(*), new(*)
+         integer(c_int) :: status
+      end function posix_rename
+
+      function posix_link(old, new) result(status) bind(c, name='link')
+         import :: c_char, c_int
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: old(*), new(*)
+         integer(c_int) :: status
+      end function posix_link
+
+      function posix_unlink(path) result(status) bind(c, name='unlink')
+         import :: c_char, c_int
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_int) :: status
+      end function posix_unlink
+
+      function posix_signal(number, handler) result(previous) bind(c, name='signal')
+         import :: c_funptr, c_int
+         implicit none (type, external)
+         integer(c_int), value :: number
+         type(c_funptr), value :: handler
+         type(c_funptr) :: previous
+      end function posix_signal
+
+      function posix_errno_location() result(location) bind(c, name='__errno_location')
+         import :: c_ptr
+         implicit none (type, external)
+         type(c_ptr) :: location
+      end function posix_errno_location
+
+      function posix_strerror(number) result(text) bind(c, name='strerror')
+         import :: c_int, c_ptr
+         implicit none (type, external)
+         integer(c_int), value :: number
+         type(c_ptr) :: text
+      end function posix_strerror
+
+      function posix_strlen(text) result(length) bind(c, name='strlen')
+         import :: c_ptr, c_size_t
+         implicit none (type, external)
+         type(c_ptr), value :: text
+         integer(c_size_t) :: length
+      end function posix_strlen
+
+      ! time_t is taken as long, which it is on every 64-bit Linux
+      function posix_time(seconds) result(again) bind(c, name='time')
+         import :: c_long
+         implicit none (type, external)
+         integer(c_long), intent(out) :: seconds
+         integer(c_long) :: again
+      end function posix_time
+
+      function posix_gmtime(seconds) result(broken_down) bind(c, name='gmtime')
+         import :: c_long, c_ptr
+         implicit none (type, external)
+         integer(c_long), intent(in) :: seconds
+         type(c_ptr) :: broken_down
+      end function posix_gmtime
+
+      function posix_strftime(text, size, format, broken_down) result(length) bind(c, name='strftime')
+         import :: c_char, c_ptr, c_size_t
+         implicit none (type, external)
+         character(kind=c_char), intent(out) :: text(*)
+         integer(c_size_t), value :: size
+         character(kind=c_char), intent(in) :: format(*)
+         type(c_ptr), value :: broken_down
+         integer(c_size_t) :: length
+      end function posix_strftime
+   end interface
+
+contains
+
+   !> Number of this process.
+   function process_id() result(pid)
+      integer :: pid
+      pid = int(posix_getpid())
+   end function process_id
+
+   !> Name of this machine; 'unknown' if the system does not tell.
+   function host_name() result(name)
+      character(len=:), allocatable :: name
+      character(kind=c_char, len=256) :: buffer
+
+      buffer = repeat(c_null_char, len(buffer))
+      name = 'unknown'
+      if (posix_gethostname(buffer, int(len(buffer) - 1, c_size_t)) /= 0) return
+      if (index(buffer, c_null_char) > 1) name = buffer(:index(buffer, c_null_char) - 1)
+   end function host_name
+
+   !> The time now, UTC, ISO 8601: '2025-01-31T23:59:59Z'.
+   function utc_now() result(text)
+      character(len=:), allocatable :: text
+      character(kind=c_char, len=32) :: buffer
+      integer(c_long) :: seconds, again
+      integer(c_size_t) :: length
+
+      again = posix_time(seconds)
+      length = posix_strftime(buffer, int(len(buffer), c_size_t), '%Y-%m-%dT%H:%M:%SZ'//c_null_char, posix_gmtime(again))
+      text = buffer(:length)
+   end function utc_now
+
+   !> Is there anything (file, directory, ...) with this name?
+   function path_exists(path) result(exists)
+      character(len=*), intent(in) :: path
+      logical :: exists
+      exists = posix_access(path//c_null_char, f_ok) == 0
+   end function path_exists
+
+   !> Is this a directory that can be read?
+   function is_directory(path) result(directory)
+      character(len=*), intent(in) :: path
+      logical :: directory
+      type(c_ptr) :: stream
+      integer(c_int) :: status
+
+      stream = posix_opendir(path//c_null_char)
+      directory = c_associated(stream)
+      if (directory) status = posix_closedir(stream)
+   end function is_directory
+
+   !> May this process make files in a directory?
+   function is_writable(directory) result(writable)
+      character(len=*), intent(in) :: directory
+      logical :: writable
+      writable = posix_access(directory//c_null_char, ior(w_ok, x_ok)) == 0
+   end function is_writable
+
+   !> The directory a path lies in: 'a' for 'a/b', '.' for 'b', '/' for '/b'.
+   pure function parent_directory(path) result(directory)
+      character(len=*), intent(in) :: path
+      character(len=:), allocatable :: directory
+      integer :: slash
+
+      slash = index(path, '/', back=.true.)
+      select case (slash)
+      case (0)
+         directory = '.'
+      case (1)
+         directory = '/'
+      case default
+         directory = path(:slash - 1)
+      end select
+   end function parent_directory
+
+   !> Have the system put a file's data, or a directory's names, onto the disk.
+   function sync_path(path) result(failure)
+      character(len=*), intent(in) :: path
+      character(len=:), allocatable :: failure !! empty on success
+      integer(c_int) :: descriptor, status
+
+      failure = ''
+      descriptor = posix_open(path//c_null_char, o_rdonly)
+      if (descriptor < 0) then
+         failure = last_failure()
+         return
+      end if
+      if (posix_fsync(descriptor) /= 0) failure = last_failure()
+      status = posix_close(descriptor)
+   end function sync_path
+
+   !> Rename a file, replacing an existing one in the same instant.
+   function rename_over(old, new) result(failure)
+      character(len=*), intent(in) :: old, new
+      character(len=:), allocatable :: failure !! empty on success
+
+      failure = ''
+      if (posix_rename(old//c_null_char, new//c_null_char) /= 0) failure = last_failure()
+   end function rename_over
+
+   !> Rename a file unless the new name is taken, with no instant in which another process could slip in:
+   !> link(2) refuses an existing name. Where a file system has no hard links, a check and a rename must do.
+   subroutine rename_new(old, new, taken, failure)
+      character(len=*), intent(in) :: old, new
+      logical, intent(out) :: taken                         !! the new name exists; nothing was done
+      character(len=:), allocatable, intent(out) :: failure !! empty on success
+      integer(c_int) :: number
+
+      failure = ''
+      taken = .false.
+      if (posix_link(old//c_null_char, new//c_null_char) == 0) then
+         failure = remove_file(old)
+         return
+      end if
+
+      number = errno()
+      select case (number)
+      case (eexist)
+         taken = .true.
+      case (eperm, emlink, enosys, enotsup)
+         taken = path_exists(new)
+         if (.not. taken) failure = rename_over(old, new)
+      case default
+         failure = error_text(number)
+      end select
+      if (taken) failure = error_text(eexist)
+   end subroutine rename_new
+
+   !> Remove a file's name.
+   function remove_file(path) result(failure)
+      character(len=*), intent(in) :: path
+      character(len=:), allocatable :: failure !! empty on success
+
+      failure = ''
+      if (posix_unlink(path//c_null_char) /= 0) failure = last_failure()
+   end function remove_file
+
+   !> Let a write beyond the file-size limit (ulimit -f) fail with EFBIG; by default the signal SIGXFSZ kills.
+   subroutine ignore_file_size_signal()
+      type(c_funptr) :: previous
+      previous = posix_signal(sigxfsz, transfer(sig_ign, c_null_funptr))
+   end subroutine ignore_file_size_signal
+
+   !> Why the last call failed.
+   function last_failure() result(text)
+      character(len=:), allocatable :: text
+      text = error_text(errno())
+   end function last_failure
+
+   function errno() result(number)
+      integer(c_int) :: number
+      integer(c_int), pointer :: location
+      call c_f_pointer(posix_errno_location(), location)
+      number = location
+   end function errno
+
+   function error_text(number) result(text)
+      integer(c_int), intent(in) :: number
+      character(len=:), allocatable :: text
+      type(c_ptr) :: raw
+      character(kind=c_char), pointer :: characters(:)
+      integer :: i
+
+      raw = posix_strerror(number)
+      call c_f_pointer(raw, characters, [posix_strlen(raw)])
+      allocate (character(len=size(characters)) :: text)
+      do i = 1, size(characters)
+         text(i:i) = characters(i)
+      end do
+   end function error_text
+
+end module rodyn_posix

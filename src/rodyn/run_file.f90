@@ -1,0 +1,497 @@
+!> The result of one run as an HDF5 file, SPEC "Run file".
+!>
+!>     call check_output_path(path, force, error)      ! early, before computing
+!>     call run%create(path, header, force, error)
+!>     call run%append(row, error)                     ! once per output time
+!>     call run%finish('done', report, error)
+!>
+!> Until `finish` has put everything onto the disk, the file has a temporary name, `PATH.partial-PID`: whatever has the
+!> final name is complete. After a failure to write, the temporary file is removed and the type is as before `create`.
+module rodyn_run_file
+   use rodyn_build_info, only: compiler, compiler_options, git_commit, program_version
+   use rodyn_errors, only: error_type, exit_bad_input, raise
+   use rodyn_hdf5_files, only: hdf5_file, hdf5_version
+   use rodyn_kinds, only: i8, wp
+   use rodyn_posix, only: host_name, ignore_file_size_signal, is_directory, is_writable, parent_directory, path_exists, &
+      process_id, remove_file, rename_new, rename_over, sync_path, utc_now
+   use rodyn_run_layout, only: i_alpha, i_alpha_rate, i_angular_momentum, i_beta, i_beta_rate, i_displacement_x, &
+      i_displacement_y, i_energy_dissipated, i_energy_elastic, i_energy_kinetic, i_energy_residual, i_momentum_x, &
+      i_momentum_y, i_omega, i_phi, i_phi_rate, i_rotation, i_time, i_velocity_x, i_velocity_y, i_work_external, &
+      n_run_variables, run_coordinates, run_variables, solver_group
+   implicit none (type, external)
+   private
+   public :: run_file, run_header, run_row, solver_report, new_run_row, check_output_path
+
+   integer, parameter :: block_bytes = 2*1024*1024 !! memory for rows that wait to be written
+   integer, parameter :: most_block_rows = 4096
+   integer, parameter :: bytes_per_real = 8
+
+   !> What is known before the first row.
+   type :: run_header
+      character(len=:), allocatable :: title
+      character(len=:), allocatable :: input            !! the namelist as read
+      character(len=:), allocatable :: resolved_input   !! every key with the value used
+      character(len=:), allocatable :: sundials_version
+      integer :: n_rods = 0       !! n
+      integer :: n_rows = 0       !! rows to expect; 0: unknown. Only sizes the blocks
+      logical :: ledger = .true.  !! with energies and momenta
+      integer :: compression = 4  !! gzip level, 0..9
+   end type run_header
+
+   !> State and ledger at one output time; what the scene has not is zero or slaved.
+   type :: run_row
+      real(wp) :: time = 0.0_wp                !! [s]
+      real(wp), allocatable :: phi(:)          !! chord angles (n) [rad]
+      real(wp), allocatable :: alpha(:)        !! inner end slopes (n) [rad]
+      real(wp), allocatable :: beta(:)         !! outer end slopes (n) [rad]
+      real(wp), allocatable :: phi_rate(:)     !! (n) [rad/s]
+      real(wp), allocatable :: alpha_rate(:)   !! (n) [rad/s]
+      real(wp), allocatable :: beta_rate(:)    !! (n) [rad/s]
+      real(wp) :: velocity_x = 0.0_wp          !! moving frame [m/s]
+      real(wp) :: velocity_y = 0.0_wp          !! moving frame [m/s]
+      real(wp) :: omega = 0.0_wp               !! [rad/s]
+      real(wp) :: displacement_x = 0.0_wp      !! moving frame [m]
+      real(wp) :: displacement_y = 0.0_wp      !! moving frame [m]
+      real(wp) :: rotation = 0.0_wp            !! [rad]
+      real(wp) :: energy_kinetic = 0.0_wp      !! [J]
+      real(wp) :: energy_elastic = 0.0_wp      !! [J]
+      real(wp) :: energy_dissipated = 0.0_wp   !! [J]
+      real(wp) :: work_external = 0.0_wp       !! [J]
+      real(wp) :: energy_residual = 0.0_wp     !! [J]
+      real(wp) :: momentum_x = 0.0_wp          !! inertial frame [kg m/s]
+      real(wp) :: momentum_y = 0.0_wp          !! inertial frame [kg m/s]
+      real(wp) :: angular_momentum = 0.0_wp    !! inertial frame [kg m^2/s]
+   end type run_row
+
+   !> What the integrator did; the attributes of the group `solver`.
+   type :: solver_report
+      character(len=:), allocatable :: method     !! the one used: 'adams', 'bdf', 'erk'
+      character(len=:), allocatable :: reason     !! why it was chosen
+      character(len=:), allocatable :: kernel     !! 'recursive' or 'assembled'
+      integer :: order = 0                        !! highest order allowed
+      real(wp) :: rtol = 0.0_wp                   !! relative tolerance
+      real(wp) :: atol = 0.0_wp                   !! absolute tolerance
+      real(wp) :: max_step = 0.0_wp               !! [s]; 0: no bound
+      real(wp) :: fixed_step = 0.0_wp             !! [s]; 0: adaptive
+      real(wp) :: last_step = 0.0_wp              !! [s]
+      integer(i8) :: n_steps = 0_i8
+      integer(i8) :: n_rhs = 0_i8                 !! right-hand sides
+      integer(i8) :: n_jac = 0_i8                 !! Jacobians
+      integer(i8) :: n_linear_setups = 0_i8
+      integer(i8) :: n_nonlinear_iterations = 0_i8
+      integer(i8) :: n_nonlinear_failures = 0_i8
+      integer(i8) :: n_error_test_failures = 0_i8
+      integer(i8) :: n_restarts = 0_i8            !! at switches of loads
+      real(wp) :: wall_seconds = 0.0_wp
+   end type solver_report
+
+   !> Rows of one data set that wait to be written.
+   type :: column
+      logical :: used = .false.
+      real(wp), allocatable :: rods(:, :)   !! (n, block_rows)
+      real(wp), allocatable :: scalars(:)   !! (block_rows)
+   end type column
+
+   type :: run_file
+      type(hdf5_file) :: file                          !! for attributes beyond those written here
+      character(len=:), allocatable :: path            !! final name
+      character(len=:), allocatable :: temporary_path
+      logical, private :: force = .false.
+      logical, private :: ledger = .true.
+      integer, private :: n_rods = 0
+      integer, private :: block_rows = 0
+      integer, private :: waiting = 0                  !! rows in the columns
+      integer(i8), private :: n_rows = 0_i8            !! rows appended so far
+      real(wp), private :: last_time = 0.0_wp          !! of the last row [s]
+      type(column), private :: columns(n_run_variables)
+   contains
+      procedure :: create
+      procedure :: append
+      procedure :: finish
+      procedure :: discard
+      procedure, private :: write_layout
+      procedure, private :: write_header
+      procedure, private :: write_solver_report
+      procedure, private :: write_waiting_rows
+      procedure, private :: put_on_disk
+   end type run_file
+
+contains
+
+   !> A row of zeros for a chain of n rods. Make one and use it for all times.
+   pure function new_run_row(n_rods) result(row)
+      integer, intent(in) :: n_rods
+      type(run_row) :: row
+
+      allocate (row%phi(n_rods), row%alpha(n_rods), row%beta(n_rods), source=0.0_wp)
+      allocate (row%phi_rate(n_rods), row%alpha_rate(n_rods), row%beta_rate(n_rods), source=0.0_wp)
+   end function new_run_row
+
+   !> Refuse a path at which no result can or may appear. Nothing is written.
+   subroutine check_output_path(path, force, error)
+      character(len=*), intent(in) :: path
+      logical, intent(in) :: force                       !! an existing file may be replaced
+      type(error_type), allocatable, intent(out) :: error
+      character(len=:), allocatable :: directory
+
+      directory = parent_directory(path)
+      if (len(path) == 0) then
+         call raise(error, 'the name of the output file is empty', exit_bad_input)
+      else if (is_directory(path)) then
+         call raise(error, path//': is a directory; give the name of a file', exit_bad_input)
+      else if (path_exists(path) .and. .not. force) then
+         call raise(error, path//': exists already; --force replaces it', exit_bad_input)
+      else if (.not. path_exists(directory)) then
+         call raise(error, path//": the directory '"//directory//"' does not exist", exit_bad_input)
+      else if (.not. is_directory(directory)) then
+         call raise(error, path//": '"//directory//"' is not a directory that can be read", exit_bad_input)
+      else if (.not. is_writable(directory)) then
+         call raise(error, path//": no permission to write in the directory '"//directory//"'", exit_bad_input)
+      end if
+   end subroutine check_output_path
+
+   !> Make the file under its temporary name, with all data sets, empty, and the root attributes.
+   subroutine create(self, path, header, force, error)
+      class(run_file), intent(inout) :: self
+      character(len=*), intent(in) :: path                !! final name
+      type(run_header), intent(in) :: header
+      logical, intent(in) :: force                        !! `finish` may replace an existing file
+      type(error_type), allocatable, intent(out) :: error
+      integer :: i
+
+      call check_output_path(path, force, error)
+      if (allocated(error)) return
+      call ignore_file_size_signal()
+
+      self%path = path
+      self%temporary_path = free_temporary_name(path)
+      self%force = force
+      self%ledger = header%ledger
+      self%n_rods = header%n_rods
+      self%block_rows = rows_per_block(header)
+      self%waiting = 0
+      self%n_rows = 0_i8
+      self%last_time = 0.0_wp
+      do i = 1, n_run_variables
+         self%columns(i) = new_column(header, run_variables(i)%per_rod, .not. run_variables(i)%ledger .or. self%ledger)
+      end do
+
+      call self%file%create(self%temporary_path, error)
+      if (allocated(error)) return
+      call self%write_layout(header%compression, error)
+      if (.not. allocated(error)) call self%write_header(header, error)
+      if (.not. allocated(error)) call self%file%flush(error)
+      if (allocated(error)) call self%discard()
+   end subroutine create
+
+   !> Add one row. It is copied; blocks of rows are written as they fill.
+   subroutine append(self, row, error)
+      class(run_file), intent(inout) :: self
+      type(run_row), intent(in) :: row
+      type(error_type), allocatable, intent(out) :: error
+
+      if (.not. self%file%is_open()) then
+         call raise(error, 'a row was given to a run file that is not open')
+         return
+      end if
+      self%waiting = self%waiting + 1
+      self%n_rows = self%n_rows + 1_i8
+      self%last_time = row%time
+      associate (at => self%waiting, columns => self%columns)
+         columns(i_time)%scalars(at) = row%time
+         columns(i_phi)%rods(:, at) = row%phi
+         columns(i_alpha)%rods(:, at) = row%alpha
+         columns(i_beta)%rods(:, at) = row%beta
+         columns(i_phi_rate)%rods(:, at) = row%phi_rate
+         columns(i_alpha_rate)%rods(:, at) = row%alpha_rate
+         columns(i_beta_rate)%rods(:, at) = row%beta_rate
+         columns(i_velocity_x)%scalars(at) = row%velocity_x
+         columns(i_velocity_y)%scalars(at) = row%velocity_y
+         columns(i_omega)%scalars(at) = row%omega
+         columns(i_displacement_x)%scalars(at) = row%displacement_x
+         columns(i_displacement_y)%scalars(at) = row%displacement_y
+         columns(i_rotation)%scalars(at) = row%rotation
+         if (self%ledger) then
+            columns(i_energy_kinetic)%scalars(at) = row%energy_kinetic
+            columns(i_energy_elastic)%scalars(at) = row%energy_elastic
+            columns(i_energy_dissipated)%scalars(at) = row%energy_dissipated
+            columns(i_work_external)%scalars(at) = row%work_external
+            columns(i_energy_residual)%scalars(at) = row%energy_residual
+            columns(i_momentum_x)%scalars(at) = row%momentum_x
+            columns(i_momentum_y)%scalars(at) = row%momentum_y
+            columns(i_angular_momentum)%scalars(at) = row%angular_momentum
+         end if
+      end associate
+      if (self%waiting < self%block_rows) return
+      call self%write_waiting_rows(error)
+      if (.not. allocated(error)) call self%file%flush(error)
+      if (allocated(error)) call self%discard()
+   end subroutine append
+
+   !> Write what waits, the final attributes, and give the file its final name.
+   subroutine finish(self, status, report, error, message)
+      class(run_file), intent(inout) :: self
+      character(len=*), intent(in) :: status             !! 'done', 'failed', 'stopped'
+      type(solver_report), intent(in) :: report
+      type(error_type), allocatable, intent(out) :: error
+      character(len=*), intent(in), optional :: message  !! why it is not done
+
+      if (.not. self%file%is_open()) then
+         call raise(error, 'a run file that is not open cannot be finished')
+         return
+      end if
+      call self%write_waiting_rows(error)
+      if (.not. allocated(error)) call self%write_solver_report(report, error)
+      if (.not. allocated(error)) call self%file%put_attribute('/', 't_reached', self%last_time, error)
+      if (.not. allocated(error) .and. present(message)) call self%file%put_attribute('/', 'message', message, error)
+      if (.not. allocated(error)) call self%file%put_attribute('/', 'status', status, error)
+      if (.not. allocated(error)) call self%file%flush(error)
+      if (.not. allocated(error)) call self%file%close(error)
+      if (allocated(error)) then
+         call self%discard()
+      else
+         call self%put_on_disk(error)
+      end if
+   end subroutine finish
+
+   !> Give up: close and remove the temporary file.
+   subroutine discard(self)
+      class(run_file), intent(inout) :: self
+      type(error_type), allocatable :: ignored
+      character(len=:), allocatable :: failure
+
+      call self%file%close(ignored)
+      if (allocated(self%temporary_path)) failure = remove_file(self%temporary_path)
+   end subroutine discard
+
+   !> All data sets, coordinates attached, and the group `solver`.
+   subroutine write_layout(self, compression, error)
+      class(run_file), intent(inout) :: self
+      integer, intent(in) :: compression !! gzip level
+      type(error_type), allocatable, intent(out) :: error
+      character(len=:), allocatable :: name
+      integer :: i, k
+
+      do i = 1, size(run_coordinates)
+         associate (coordinate => run_coordinates(i))
+            name = trim(coordinate%name)
+            call self%file%write(name, [(coordinate%first + k, k=0, self%n_rods + coordinate%beyond_n - 1)], compression, error)
+            if (.not. allocated(error)) call describe(self%file, name, '1', trim(coordinate%long_name), error)
+            if (.not. allocated(error)) call self%file%make_scale(name, error)
+            if (allocated(error)) return
+         end associate
+      end do
+
+      do i = 1, n_run_variables
+         if (.not. self%columns(i)%used) cycle
+         associate (variable => run_variables(i))
+            name = trim(variable%name)
+            if (variable%per_rod) then
+               call self%file%create_series(name, [self%n_rods], self%block_rows, compression, error)
+            else
+               call self%file%create_series(name, [integer ::], self%block_rows, compression, error)
+            end if
+            if (.not. allocated(error)) call describe(self%file, name, trim(variable%units), trim(variable%long_name), error)
+            if (allocated(error)) return
+            if (i == i_time) then
+               call self%file%make_scale(name, error)
+            else if (variable%per_rod) then
+               call self%file%attach_scale(name, 1, 'rod', error)
+               if (.not. allocated(error)) call self%file%attach_scale(name, 2, 'time', error)
+            else
+               call self%file%attach_scale(name, 1, 'time', error)
+            end if
+            if (allocated(error)) return
+         end associate
+      end do
+
+      call self%file%create_group(solver_group, error)
+   end subroutine write_layout
+
+   !> Unit and meaning of a data set.
+   subroutine describe(file, name, units, long_name, error)
+      type(hdf5_file), intent(in) :: file
+      character(len=*), intent(in) :: name, units, long_name
+      type(error_type), allocatable, intent(out) :: error
+
+      call file%put_attribute(name, 'units', units, error)
+      if (.not. allocated(error)) call file%put_attribute(name, 'long_name', long_name, error)
+   end subroutine describe
+
+   !> Root attributes: what ran, with what, on what.
+   subroutine write_header(self, header, error)
+      class(run_file), intent(in) :: self
+      type(run_header), intent(in) :: header
+      type(error_type), allocatable, intent(out) :: error
+
+      call put('title', text_or_empty(header%title))
+      call put('status', 'running')
+      call put('program_version', program_version)
+      call put('git_commit', git_commit)
+      call put('compiler', compiler())
+      call put('compiler_options', compiler_options())
+      call put('sundials_version', text_or_empty(header%sundials_version))
+      call put('hdf5_version', hdf5_version())
+      call put('hostname', host_name())
+      call put('created', utc_now())
+      call put('input', text_or_empty(header%input))
+      call put('resolved_input', text_or_empty(header%resolved_input))
+
+   contains
+
+      subroutine put(name, value)
+         character(len=*), intent(in) :: name, value
+         if (.not. allocated(error)) call self%file%put_attribute('/', name, value, error)
+      end subroutine put
+
+   end subroutine write_header
+
+   !> The attributes of the group `solver`.
+   subroutine write_solver_report(self, report, error)
+      class(run_file), intent(in) :: self
+      type(solver_report), intent(in) :: report
+      type(error_type), allocatable, intent(out) :: error
+
+      call put_text('method', text_or_empty(report%method))
+      call put_text('reason', text_or_empty(report%reason))
+      call put_text('kernel', text_or_empty(report%kernel))
+      if (.not. allocated(error)) call self%file%put_attribute(solver_group, 'order', report%order, error)
+      call put_real('rtol', report%rtol)
+      call put_real('atol', report%atol)
+      call put_real('max_step', report%max_step)
+      call put_real('fixed_step', report%fixed_step)
+      call put_real('last_step', report%last_step)
+      call put_count('n_steps', report%n_steps)
+      call put_count('n_rhs', report%n_rhs)
+      call put_count('n_jac', report%n_jac)
+      call put_count('n_linear_setups', report%n_linear_setups)
+      call put_count('n_nonlinear_iterations', report%n_nonlinear_iterations)
+      call put_count('n_nonlinear_failures', report%n_nonlinear_failures)
+      call put_count('n_error_test_failures', report%n_error_test_failures)
+      call put_count('n_restarts', report%n_restarts)
+      call put_real('wall_seconds', report%wall_seconds)
+
+   contains
+
+      subroutine put_text(name, value)
+         character(len=*), intent(in) :: name, value
+         if (.not. allocated(error)) call self%file%put_attribute(solver_group, name, value, error)
+      end subroutine put_text
+
+      subroutine put_real(name, value)
+         character(len=*), intent(in) :: name
+         real(wp), intent(in) :: value
+         if (.not. allocated(error)) call self%file%put_attribute(solver_group, name, value, error)
+      end subroutine put_real
+
+      subroutine put_count(name, value)
+         character(len=*), intent(in) :: name
+         integer(i8), intent(in) :: value
+         if (.not. allocated(error)) call self%file%put_attribute(solver_group, name, value, error)
+      end subroutine put_count
+
+   end subroutine write_solver_report
+
+   !> Write the rows that wait; data sets grow by exactly these.
+   subroutine write_waiting_rows(self, error)
+      class(run_file), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      integer :: i
+
+      do i = 1, n_run_variables
+         if (.not. self%columns(i)%used) cycle
+         if (run_variables(i)%per_rod) then
+            call self%file%append(trim(run_variables(i)%name), self%columns(i)%rods(:, :self%waiting), error)
+         else
+            call self%file%append(trim(run_variables(i)%name), self%columns(i)%scalars(:self%waiting), error)
+         end if
+         if (allocated(error)) return
+      end do
+      self%waiting = 0
+   end subroutine write_waiting_rows
+
+   !> Sync the closed file, rename it, sync the directory's names. If the final name was taken meanwhile, the
+   !> result stays under its temporary name and the message says so.
+   subroutine put_on_disk(self, error)
+      class(run_file), intent(in) :: self
+      type(error_type), allocatable, intent(out) :: error
+      character(len=:), allocatable :: failure
+      logical :: taken
+
+      failure = sync_path(self%temporary_path)
+      if (len(failure) > 0) then
+         call raise(error, self%temporary_path//': the result could not be put onto the disk: '//failure)
+         return
+      end if
+
+      taken = .false.
+      if (self%force) then
+         failure = rename_over(self%temporary_path, self%path)
+      else
+         call rename_new(self%temporary_path, self%path, taken, failure)
+      end if
+      if (taken) then
+         call raise(error, self%path//": appeared while this run was computing and is left alone; this run's result is '"// &
+            self%temporary_path//"'", exit_bad_input)
+      else if (len(failure) > 0) then
+         call raise(error, self%path//": cannot be given its name: "//failure//"; the result is '"//self%temporary_path//"'")
+      else
+         failure = sync_path(parent_directory(self%path))
+         if (len(failure) > 0) call raise(error, self%path//': its name could not be put onto the disk: '//failure)
+      end if
+   end subroutine put_on_disk
+
+   !> A name beside the final one that no file has. Process numbers repeat in containers, so they alone will not do.
+   function free_temporary_name(path) result(name)
+      character(len=*), intent(in) :: path
+      character(len=:), allocatable :: name
+      character(len=32) :: suffix
+      integer :: attempt
+
+      write (suffix, '(".partial-", i0)') process_id()
+      name = path//trim(suffix)
+      do attempt = 2, 1000
+         if (.not. path_exists(name)) return
+         write (suffix, '(".partial-", i0, "-", i0)') process_id(), attempt
+         name = path//trim(suffix)
+      end do
+   end function free_temporary_name
+
+   !> Memory for one block of one data set.
+   pure function new_column(header, per_rod, used) result(entry)
+      type(run_header), intent(in) :: header
+      logical, intent(in) :: per_rod !! (rod, time), otherwise (time)
+      logical, intent(in) :: used    !! the file has this data set
+      type(column) :: entry
+
+      entry%used = used
+      if (.not. used) return
+      if (per_rod) then
+         allocate (entry%rods(header%n_rods, rows_per_block(header)), source=0.0_wp)
+      else
+         allocate (entry%scalars(rows_per_block(header)), source=0.0_wp)
+      end if
+   end function new_column
+
+   !> Rows per block and chunk: as many as the memory for waiting rows allows, in blocks of about equal size.
+   pure function rows_per_block(header) result(rows)
+      type(run_header), intent(in) :: header
+      integer :: rows
+      integer :: numbers, n_blocks
+
+      numbers = count(run_variables%per_rod)*header%n_rods + count(.not. run_variables%per_rod)
+      rows = max(1, min(most_block_rows, block_bytes/(numbers*bytes_per_real)))
+      if (header%n_rows > 0) then
+         n_blocks = (header%n_rows - 1)/rows + 1
+         rows = (header%n_rows - 1)/n_blocks + 1
+      end if
+   end function rows_per_block
+
+   pure function text_or_empty(text) result(value)
+      character(len=:), allocatable, intent(in) :: text
+      character(len=:), allocatable :: value
+      value = ''
+      if (allocated(text)) value = text
+   end function text_or_empty
+
+end module rodyn_run_file
