@@ -133,7 +133,8 @@ contains
    pure real(wp) function elastic_energy(scene, q)
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: q(:)
-      real(wp) :: theta(0:scene%n - 1), unused(0:scene%n - 1), alpha(scene%n), beta(scene%n)
+      real(wp) :: theta(0:scene%n - 1), unused(0:scene%n - 1)
+      real(wp), dimension(scene%n) :: alpha, beta, alpha_rate, beta_rate
       integer :: k
 
       associate (first => scene%n_base + 1)
@@ -141,29 +142,36 @@ contains
       end associate
       elastic_energy = 0.5_wp*sum(scene%hinges%stiffness*theta**2)
       if (.not. (scene%dynamic_bending .or. scene%quasistatic)) return
-      call slopes(scene, q, alpha, beta)
+      call slopes(scene, q, q, alpha, beta, alpha_rate, beta_rate)
       do k = 1, scene%n
          elastic_energy = elastic_energy + scene%rods(scene%rod_of(k))%kappa* &
                           (alpha(k)**2 + alpha(k)*beta(k) + beta(k)**2)
       end do
    end function elastic_energy
 
-   !> End slopes alpha, beta: states, or slaved to the hinge springs (without their dampers), or zero.
-   pure subroutine slopes(scene, q, alpha, beta)
+   !> End slopes alpha, beta and their rates: states, or slaved to the hinge springs (not to their dampers,
+   !> which the reduced system sees through Rayleigh's function only), or zero.
+   pure subroutine slopes(scene, q, p, alpha, beta, alpha_rate, beta_rate)
       type(scene_type), intent(in) :: scene
-      real(wp), intent(in) :: q(:)
-      real(wp), intent(out) :: alpha(:), beta(:) !! (n) [rad]
-      real(wp) :: theta(0:scene%n - 1), unused(0:scene%n - 1)
+      real(wp), intent(in) :: q(:), p(:)
+      real(wp), intent(out) :: alpha(:), beta(:)           !! (n) [rad]
+      real(wp), intent(out) :: alpha_rate(:), beta_rate(:) !! (n) [rad/s]
+      real(wp) :: theta(0:scene%n - 1), theta_rate(0:scene%n - 1)
 
       alpha = 0.0_wp
       beta = 0.0_wp
-      associate (n => scene%n, first => scene%n_base + 1)
+      alpha_rate = 0.0_wp
+      beta_rate = 0.0_wp
+      associate (n => scene%n, first => scene%n_base + 1, hinges => scene%hinges)
          if (scene%dynamic_bending) then
             alpha = q(scene%alpha_at() + 1:scene%alpha_at() + n)
             beta = q(scene%beta_at() + 1:scene%beta_at() + n)
+            alpha_rate = p(scene%alpha_at() + 1:scene%alpha_at() + n)
+            beta_rate = p(scene%beta_at() + 1:scene%beta_at() + n)
          else if (scene%quasistatic) then
-            call hinge_state(scene%hinges, n, .false., q(first:), q(first:), theta, unused)
-            call slopes_from_moments(scene%hinges%series, scene%hinges%stiffness*theta, alpha, beta)
+            call hinge_state(hinges, n, .false., q(first:), p(first:), theta, theta_rate)
+            call slopes_from_moments(hinges%series, hinges%stiffness*theta, alpha, beta)
+            call slopes_from_moments(hinges%series, hinges%stiffness*theta_rate, alpha_rate, beta_rate)
          end if
       end associate
    end subroutine slopes

@@ -1,0 +1,183 @@
+!> One case from its description to its HDF5 file: what `rodyn run` does, and what a library user may call.
+module rodyn_run
+   use, intrinsic :: iso_fortran_env, only: output_unit
+   use rodyn_kinds, only: wp, i8
+   use rodyn_errors, only: error_type, raise, exit_stopped
+   use rodyn_case_config, only: case_config
+   use rodyn_case_reader, only: resolved_case
+   use rodyn_scene, only: scene_type, new_scene
+   use rodyn_motion, only: motion_type, new_motion, initial_state
+   use rodyn_kinematics, only: invariants_type, invariants
+   use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, time_text
+   use rodyn_integrators, only: new_integrator, sundials_version
+   use rodyn_method_choice, only: method_choice, choose_method
+   use rodyn_simulation, only: observer_type, simulate
+   use rodyn_ledger, only: fill_row
+   use rodyn_run_file, only: run_file, run_header, run_row, solver_report, new_run_row, check_output_path
+   use rodyn_progress, only: progress_monitor, new_progress
+   use rodyn_description, only: describe_scene
+   implicit none (type, external)
+   private
+   public :: run_case
+
+   !> Takes rows down into the run file.
+   type, extends(observer_type) :: recorder_type
+      type(run_file) :: file
+      type(run_row) :: row
+      real(wp) :: initial_energy = 0.0_wp !! kinetic + elastic at t = 0 [J]
+      logical :: started = .false.
+      real(wp) :: worst_residual = 0.0_wp !! of the ledger [J]
+      real(wp) :: energy_scale = 0.0_wp   !! largest energy so far [J]
+   contains
+      procedure :: observe
+   end type recorder_type
+
+contains
+
+   !> Run a case and write its file. On failure of the integration the file holds all rows until then, with
+   !> status 'failed'; on refused input nothing is written.
+   subroutine run_case(config, path, error, input_text, force, quiet)
+      type(case_config), intent(in) :: config
+      character(len=*), intent(in) :: path                 !! of the HDF5 file
+      type(error_type), allocatable, intent(out) :: error
+      character(len=*), intent(in), optional :: input_text !! namelist as read, kept in the file
+      logical, intent(in), optional :: force               !! replace an existing file
+      logical, intent(in), optional :: quiet               !! print nothing
+      type(scene_type) :: scene
+      type(motion_type), target :: motion
+      type(recorder_type) :: recorder
+      type(method_choice) :: choice
+      type(run_header) :: header
+      class(integrator_type), allocatable :: integrator
+      type(progress_monitor), target :: progress
+      real(wp), allocatable :: y(:)
+      type(error_type), allocatable :: failure
+      logical :: silent, replace
+      integer(i8) :: clock_start, clock_end, clock_rate
+      real(wp) :: t
+      integer :: i
+
+      silent = .false.
+      replace = .false.
+      if (present(quiet)) silent = quiet
+      if (present(force)) replace = force
+      call system_clock(clock_start, clock_rate)
+
+      call check_output_path(path, replace, error)
+      if (.not. allocated(error)) call new_scene(scene, config, error)
+      if (.not. allocated(error)) call new_motion(motion, scene, config%output%ledger, error)
+      if (allocated(error)) return
+      call initial_state(motion, config%initial, y)
+      call choose_method(choice, config%solver, scene, y(:scene%n_dof), config%t_end, error)
+      if (allocated(error)) return
+      if (.not. silent) then
+         write (output_unit, '(a)') describe_scene(scene, config%output%ledger)
+         write (output_unit, '(a)') 'method  '//choice%method//': '//choice%reason
+      end if
+      call new_integrator(integrator, motion, choice%method, options_of(config), error)
+      if (allocated(error)) return
+
+      header = run_header(title=config%title, input='', resolved_input=resolved_case(config), &
+                          sundials_version=sundials_version(), n_rods=scene%n, n_rows=config%n_outputs + 1, &
+                          ledger=config%output%ledger, compression=config%output%compression)
+      if (present(input_text)) header%input = input_text
+      call recorder%file%create(path, header, replace, error)
+      if (allocated(error)) return
+      recorder%row = new_run_row(scene%n)
+      progress = new_progress(0.0_wp, config%t_end, silent)
+      call integrator%set_monitor(progress)
+      call simulate(motion, integrator, [(config%t_end*(real(i, wp)/config%n_outputs), i=0, config%n_outputs)], &
+                    config%t_end, recorder, y, t, failure)
+      call progress%finish()
+      call system_clock(clock_end)
+      call close_file(recorder%file, integrator, choice, config, scene, failure, &
+                      real(clock_end - clock_start, wp)/real(clock_rate, wp), error)
+      if (.not. silent .and. .not. allocated(error)) call print_result(integrator, recorder, path, config, t, &
+                                                                        real(clock_end - clock_start, wp)/real(clock_rate, wp))
+      call integrator%finalize()
+      if (allocated(error)) return
+      if (allocated(failure)) then
+         failure%message = failure%message//' (rows until then are in '//path//')'
+         call move_alloc(failure, error)
+      end if
+   end subroutine run_case
+
+   !> Take down one row.
+   subroutine observe(self, motion, t, y, error)
+      class(recorder_type), intent(inout) :: self
+      type(motion_type), intent(in) :: motion
+      real(wp), intent(in) :: t
+      real(wp), intent(in) :: y(:)
+      type(error_type), allocatable, intent(out) :: error
+      type(invariants_type) :: start
+
+      if (.not. self%started .and. motion%ledger) then
+         start = invariants(motion%dynamics%scene, y(:motion%n_dof), y(motion%n_dof + 1:2*motion%n_dof))
+         self%initial_energy = start%kinetic + start%elastic
+      end if
+      self%started = .true.
+      call fill_row(motion, t, y, self%initial_energy, self%row)
+      self%worst_residual = max(self%worst_residual, abs(self%row%energy_residual))
+      self%energy_scale = max(self%energy_scale, self%row%energy_kinetic + self%row%energy_elastic)
+      call self%file%append(self%row, error)
+   end subroutine observe
+
+   !> The user's choices, for the integrator.
+   function options_of(config) result(options)
+      type(case_config), intent(in) :: config
+      type(solver_options) :: options
+      associate (solver => config%solver)
+         options = solver_options(rtol=solver%rtol, atol=solver%atol, order=solver%order, max_step=solver%max_step, &
+                                  fixed_step=solver%fixed_step, max_steps=solver%max_steps)
+      end associate
+   end function options_of
+
+   !> Attributes of the solver, status, and the final name.
+   subroutine close_file(file, integrator, choice, config, scene, failure, seconds, error)
+      type(run_file), intent(inout) :: file
+      class(integrator_type), intent(inout) :: integrator
+      type(method_choice), intent(in) :: choice
+      type(case_config), intent(in) :: config
+      type(scene_type), intent(in) :: scene
+      type(error_type), allocatable, intent(in) :: failure
+      real(wp), intent(in) :: seconds
+      type(error_type), allocatable, intent(out) :: error
+      type(solver_statistics) :: stats
+      type(solver_report) :: report
+
+      stats = integrator%statistics()
+      report = solver_report(method=choice%method, reason=choice%reason, &
+                             kernel=trim(merge('assembled', 'recursive', scene%assembled)), &
+                             order=config%solver%order, rtol=config%solver%rtol, atol=config%solver%atol, &
+                             max_step=config%solver%max_step, fixed_step=config%solver%fixed_step, &
+                             last_step=stats%last_step, n_steps=stats%n_steps, n_rhs=stats%n_rhs, n_jac=stats%n_jac, &
+                             n_nonlinear_failures=stats%n_nonlinear_failures, &
+                             n_error_test_failures=stats%n_error_test_failures, &
+                             n_restarts=max(0_i8, stats%n_starts - 1_i8), wall_seconds=seconds)
+      if (.not. allocated(failure)) then
+         call file%finish('done', report, error)
+      else if (failure%exit_code == exit_stopped) then
+         call file%finish('stopped', report, error, failure%message)
+      else
+         call file%finish('failed', report, error, failure%message)
+      end if
+   end subroutine close_file
+
+   !> Last lines on the terminal.
+   subroutine print_result(integrator, recorder, path, config, t, seconds)
+      class(integrator_type), intent(inout) :: integrator
+      type(recorder_type), intent(in) :: recorder
+      character(len=*), intent(in) :: path
+      type(case_config), intent(in) :: config
+      real(wp), intent(in) :: t, seconds
+      type(solver_statistics) :: stats
+
+      stats = integrator%statistics()
+      write (output_unit, '(a, i0, a, i0, a, f0.3, a)') 'done    t = '//time_text(t)//' s, ', stats%n_steps, ' steps, ', &
+         stats%n_rhs, ' right-hand sides, ', seconds, ' s'
+      if (config%output%ledger) write (output_unit, '(a, es8.1, a, es8.1, a)') 'ledger  largest energy residual ', &
+         recorder%worst_residual, ' J of ', recorder%energy_scale, ' J'
+      write (output_unit, '(a)') 'file    '//path
+   end subroutine print_result
+
+end module rodyn_run
