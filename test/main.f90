@@ -5,6 +5,9 @@ program tester
    use test_kernels, only: collect_kernels
    use test_motion, only: collect_motion
    use test_run_file, only: collect_run_file
+   use test_testing, only: suite_tally, unittest, run_suite
+   use test_integrators, only: collect_integrators
+   use test_progress, only: collect_progress
    implicit none (type, external)
    type(suite_tally) :: tally
    type(unittest), allocatable :: suite(:)
@@ -21,6 +24,10 @@ program tester
    call run_suite('hdf5_files', suite, tally, trim(filter))
    call collect_run_file(suite)
    call run_suite('run_file', suite, tally, trim(filter))
+   call collect_integrators(suite)
+   call run_suite('integrators', suite, tally, trim(filter))
+   call collect_progress(suite)
+   call run_suite('progress', suite, tally, trim(filter))
 
    write (*, '(i0, " passed, ", i0, " failed")') tally%passed, tally%failed
    if (tally%failed > 0 .or. tally%passed == 0) stop 1, quiet=.true.

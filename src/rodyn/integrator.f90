@@ -1,0 +1,261 @@
+!> What every integrator offers: start, advance to a time exactly, stop times that are never crossed.
+!>
+!> A run is one or more intervals between switches of the loads. Each interval is `set_stop(t_stop)`,
+!> `start(t, y)` and any number of `advance(t_out, ...)` with t_out <= t_stop:
+!>
+!>     call integrator%set_stop(t_switch)
+!>     call integrator%start(t, y, error)
+!>     do i = 1, size(times)
+!>        call integrator%advance(times(i), y, t, error)
+!>        if (allocated(error)) exit        ! t, y: the last good time and state
+!>     end do
+!>
+!> The output times never influence the steps: they are found from the steps, not stepped to.
+module rodyn_integrator
+   use rodyn_kinds, only: wp, i8
+   use rodyn_errors, only: error_type, raise, exit_stopped
+   use rodyn_ode, only: ode_system
+   implicit none (type, external)
+   private
+   public :: integrator_type, solver_options, solver_statistics, monitor_type
+   public :: time_text
+
+   !> What the user chooses of a method.
+   type :: solver_options
+      real(wp) :: rtol = 1.0e-8_wp       !! relative tolerance, > 0
+      real(wp) :: atol = 1.0e-10_wp      !! absolute tolerance of every controlled state, > 0
+      integer :: order = 0               !! highest order of a multistep method, order of a one-step method; 0: the default
+      real(wp) :: max_step = 0.0_wp      !! [s]; 0: no bound
+      real(wp) :: fixed_step = 0.0_wp    !! [s], one-step methods only; 0: adaptive
+      integer :: max_steps = 1000000000  !! internal steps of the whole run, restarts included
+      logical :: stability_limit_detection = .false. !! BDF: lower the order where orders 3 to 5 are unstable
+   end type solver_options
+
+   !> Counts over the whole run, restarts included.
+   type :: solver_statistics
+      integer(i8) :: n_steps = 0               !! internal steps
+      integer(i8) :: n_rhs = 0                 !! right-hand sides
+      integer(i8) :: n_jac = 0                 !! Jacobians
+      integer(i8) :: n_error_test_failures = 0 !! steps repeated because the error was too large
+      integer(i8) :: n_nonlinear_failures = 0  !! failures of the nonlinear iteration
+      integer(i8) :: n_starts = 0              !! starts and restarts
+      integer :: last_order = 0                !! order of the last step
+      real(wp) :: last_step = 0.0_wp           !! [s]
+   end type solver_statistics
+
+   !> Someone who watches a run: called about five times a second of wall time.
+   type, abstract :: monitor_type
+   contains
+      procedure(report_interface), deferred :: report
+      procedure :: stop_requested
+   end type monitor_type
+
+   !> An initial value solver for one system.
+   type, abstract :: integrator_type
+      class(ode_system), pointer :: system => null()    !! not owned; must outlive the integrator
+      class(monitor_type), pointer :: monitor => null() !! not owned
+      type(solver_options) :: options
+      real(wp) :: t_stop = -huge(1.0_wp)  !! no right-hand side is evaluated beyond it [s]
+      real(wp) :: t_good = 0.0_wp         !! end of the last good internal step [s]
+      real(wp), allocatable :: y_good(:)  !! state there (n_states)
+      integer(i8) :: n_steps = 0          !! internal steps of the whole run
+      integer(i8) :: n_starts = 0
+      integer(i8), private :: clock_report = 0, clock_look = 0 !! wall clock at the last report, the last look [counts]
+      integer, private :: steps_to_look = 1, stride = 1        !! the clock is read every `stride` steps
+   contains
+      procedure(start_interface), deferred :: start
+      procedure(advance_interface), deferred :: advance
+      procedure(statistics_interface), deferred :: statistics
+      procedure(finalize_interface), deferred :: finalize
+      procedure :: set_stop
+      procedure :: set_monitor
+      procedure :: begin_interval
+      procedure :: check_target
+      procedure :: permit_step
+   end type integrator_type
+
+   abstract interface
+      !> A sign of life.
+      subroutine report_interface(self, t, n_steps)
+         import :: monitor_type, wp, i8
+         implicit none (type, external)
+         class(monitor_type), intent(inout) :: self
+         real(wp), intent(in) :: t          !! simulated time reached [s]
+         integer(i8), intent(in) :: n_steps !! internal steps so far
+      end subroutine report_interface
+
+      !> First start, and every exact restart: forget the history and begin at (t, y). `set_stop` comes before.
+      subroutine start_interface(self, t, y, error)
+         import :: integrator_type, error_type, wp
+         implicit none (type, external)
+         class(integrator_type), intent(inout) :: self
+         real(wp), intent(in) :: t    !! [s]
+         real(wp), intent(in) :: y(:) !! (n_states)
+         type(error_type), allocatable, intent(out) :: error
+      end subroutine start_interface
+
+      !> Integrate to exactly t_out. On failure `error` is allocated and t, y are the last good internal time and state.
+      subroutine advance_interface(self, t_out, y, t, error)
+         import :: integrator_type, error_type, wp
+         implicit none (type, external)
+         class(integrator_type), intent(inout) :: self
+         real(wp), intent(in) :: t_out !! not before the previous one, not after the stop time [s]
+         real(wp), intent(out) :: y(:) !! (n_states)
+         real(wp), intent(out) :: t    !! t_out, or the last good time [s]
+         type(error_type), allocatable, intent(out) :: error
+      end subroutine advance_interface
+
+      function statistics_interface(self) result(stats)
+         import :: integrator_type, solver_statistics
+         implicit none (type, external)
+         class(integrator_type), intent(inout) :: self
+         type(solver_statistics) :: stats
+      end function statistics_interface
+
+      !> Release everything; may be called twice.
+      subroutine finalize_interface(self)
+         import :: integrator_type
+         implicit none (type, external)
+         class(integrator_type), intent(inout) :: self
+      end subroutine finalize_interface
+   end interface
+
+   real(wp), parameter :: report_interval = 0.2_wp !! wall time between two reports [s]
+
+contains
+
+   !> Never, unless a monitor says otherwise. When true, `advance` ends with exit code `exit_stopped`.
+   function stop_requested(self) result(requested)
+      class(monitor_type), intent(in) :: self
+      logical :: requested
+      associate (unused => self); end associate
+      requested = .false.
+   end function stop_requested
+
+   !> The next time that must not be crossed: a switch of a load, or the end.
+   subroutine set_stop(self, t_stop)
+      class(integrator_type), intent(inout) :: self
+      real(wp), intent(in) :: t_stop !! [s]
+      self%t_stop = t_stop
+   end subroutine set_stop
+
+   subroutine set_monitor(self, monitor)
+      class(integrator_type), intent(inout) :: self
+      class(monitor_type), target, intent(inout) :: monitor !! must outlive the run
+      self%monitor => monitor
+   end subroutine set_monitor
+
+   !> Note the start of an interval; refuse a state that is no state. For use by `start` of every integrator.
+   subroutine begin_interval(self, t, y, error)
+      class(integrator_type), intent(inout) :: self
+      real(wp), intent(in) :: t    !! [s]
+      real(wp), intent(in) :: y(:) !! (n_states)
+      type(error_type), allocatable, intent(out) :: error
+
+      if (.not. associated(self%system)) then
+         call raise(error, 'start: the integrator has no system')
+      else if (size(y) /= self%system%n_states) then
+         call raise(error, 'start: wrong number of states')
+      else if (.not. all(abs(y) <= huge(y))) then
+         call raise(error, 'start at t = '//time_text(t)//' s: the initial state is not finite')
+      else if (self%t_stop < t) then
+         call raise(error, 'start at t = '//time_text(t)//' s: the stop time '//time_text(self%t_stop)//' s lies before it')
+      end if
+      if (allocated(error)) return
+      self%t_good = t
+      self%y_good = y
+      self%n_starts = self%n_starts + 1
+   end subroutine begin_interval
+
+   !> Refuse an output time beyond the stop time, or an integrator that was never started.
+   subroutine check_target(self, t_out, error)
+      class(integrator_type), intent(in) :: self
+      real(wp), intent(in) :: t_out !! [s]
+      type(error_type), allocatable, intent(out) :: error
+      if (self%n_starts == 0) then
+         call raise(error, 'advance: the integrator was not started')
+      else if (.not. t_out <= self%t_stop) then
+         call raise(error, 'advance to t = '//time_text(t_out)//' s: beyond the stop time '//time_text(self%t_stop)//' s')
+      end if
+   end subroutine check_target
+
+   !> Called before each internal step: counts it, refuses one too many, lets the monitor speak and stop the run.
+   subroutine permit_step(self, error)
+      class(integrator_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error !! max_steps reached, or a stop was requested
+
+      character(len=20) :: digits
+
+      if (self%n_steps >= self%options%max_steps) then
+         write (digits, '(i0)') self%options%max_steps
+         call raise(error, 'max_steps = '//trim(digits)//' reached at t = '//time_text(self%t_good)//' s')
+         return
+      end if
+      self%n_steps = self%n_steps + 1
+      if (.not. associated(self%monitor)) return
+      self%steps_to_look = self%steps_to_look - 1
+      if (self%steps_to_look > 0) return
+      call look_at_clock(self)
+      if (self%monitor%stop_requested()) then
+         self%n_steps = self%n_steps - 1
+         call raise(error, 'stopped on request at t = '//time_text(self%t_good)//' s', exit_stopped)
+      end if
+   end subroutine permit_step
+
+   !> Report when it is time, and choose how many steps to take until the next look: about 20 ms of them.
+   subroutine look_at_clock(self)
+      class(integrator_type), intent(inout) :: self
+      integer, parameter :: longest_stride = 4096
+      integer(i8) :: now, rate
+      real(wp) :: since_look
+
+      call system_clock(now, rate)
+      since_look = real(now - self%clock_look, wp)/real(rate, wp)
+      if (since_look > 0.04_wp) then
+         self%stride = max(1, self%stride/4)
+      else if (since_look < 0.01_wp) then
+         self%stride = min(longest_stride, 2*self%stride)
+      end if
+      self%clock_look = now
+      self%steps_to_look = self%stride
+      if (real(now - self%clock_report, wp) < report_interval*real(rate, wp)) return
+      self%clock_report = now
+      call self%monitor%report(self%t_good, self%n_steps - 1)
+   end subroutine look_at_clock
+
+   !> A time for a message: ten digits, no idle zeros.
+   pure function time_text(t) result(text)
+      real(wp), intent(in) :: t !! [s]
+      character(len=:), allocatable :: text
+
+      character(len=32) :: digits
+      character(len=:), allocatable :: mantissa, exponent
+      integer :: i_exponent
+
+      if (abs(t) >= 1.0e-3_wp .and. abs(t) < 1.0e6_wp) then
+         write (digits, '(f0.10)') t
+      else if (abs(t) > 0.0_wp) then
+         write (digits, '(es16.9)') t
+      else
+         digits = '0'
+      end if
+      text = trim(adjustl(digits))
+      i_exponent = scan(text, 'E')
+      exponent = ''
+      mantissa = text
+      if (i_exponent > 0) then
+         exponent = text(i_exponent:)
+         mantissa = text(:i_exponent - 1)
+      end if
+      if (index(mantissa, '.') > 0) then
+         do while (mantissa(len(mantissa):) == '0')
+            mantissa = mantissa(:len(mantissa) - 1)
+         end do
+         if (mantissa(len(mantissa):) == '.') mantissa = mantissa(:len(mantissa) - 1)
+      end if
+      if (mantissa(1:1) == '.') mantissa = '0'//mantissa
+      if (index(mantissa, '-.') == 1) mantissa = '-0'//mantissa(2:)
+      text = mantissa//exponent
+   end function time_text
+
+end module rodyn_integrator

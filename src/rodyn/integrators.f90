@@ -1,0 +1,63 @@
+!> One place that knows every method by name.
+module rodyn_integrators
+   use rodyn_kinds, only: wp
+   use rodyn_errors, only: error_type, raise
+   use rodyn_ode, only: ode_system
+   use rodyn_integrator, only: integrator_type, solver_options
+   use rodyn_cvode_integrator, only: cvode_integrator, new_cvode_integrator
+   use rodyn_erk_integrator, only: erk_integrator, new_erk_integrator
+   use rodyn_sundials_base, only: sundials_version
+   implicit none (type, external)
+   private
+   public :: new_integrator, integrator_names, sundials_version
+
+   !> What `method` may be.
+   character(len=5), parameter :: integrator_names(3) = [character(len=5) :: 'adams', 'bdf', 'erk']
+
+contains
+
+   !> An integrator for `system`, not yet started.
+   subroutine new_integrator(integrator, system, method, options, error)
+      class(integrator_type), allocatable, intent(out) :: integrator
+      class(ode_system), target, intent(inout) :: system !! must outlive the integrator
+      character(len=*), intent(in) :: method             !! one of `integrator_names`
+      type(solver_options), intent(in) :: options
+      type(error_type), allocatable, intent(out) :: error
+
+      type(cvode_integrator), allocatable :: cvode
+      type(erk_integrator), allocatable :: erk
+
+      call check_options(options, error)
+      if (allocated(error)) return
+      select case (method)
+      case ('adams', 'bdf')
+         allocate (cvode)
+         call new_cvode_integrator(cvode, system, trim(method), options, error)
+         call move_alloc(cvode, integrator)
+      case ('erk')
+         allocate (erk)
+         call new_erk_integrator(erk, system, options, error)
+         call move_alloc(erk, integrator)
+      case default
+         call raise(error, 'no integrator is called '''//trim(method)//'''; there are adams, bdf and erk')
+      end select
+   end subroutine new_integrator
+
+   !> What no method can work with.
+   subroutine check_options(options, error)
+      type(solver_options), intent(in) :: options
+      type(error_type), allocatable, intent(out) :: error
+      if (.not. options%rtol > 0.0_wp) then
+         call raise(error, 'rtol: must be positive')
+      else if (.not. options%atol > 0.0_wp) then
+         call raise(error, 'atol: must be positive')
+      else if (.not. options%max_step >= 0.0_wp) then
+         call raise(error, 'max_step: must not be negative')
+      else if (.not. options%fixed_step >= 0.0_wp) then
+         call raise(error, 'fixed_step: must not be negative')
+      else if (options%max_steps < 1) then
+         call raise(error, 'max_steps: must be at least 1')
+      end if
+   end subroutine check_options
+
+end module rodyn_integrators

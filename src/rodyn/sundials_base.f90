@@ -1,0 +1,170 @@
+!> What CVODE and ARKODE share: the callbacks, the text of return codes, the version.
+module rodyn_sundials_base
+   use, intrinsic :: iso_c_binding, only: c_ptr, c_int, c_long, c_double, c_char, c_size_t, c_null_char, &
+      c_f_pointer, c_loc, c_associated
+   use rodyn_kinds, only: wp, i8
+   use rodyn_ode, only: ode_system
+   use rodyn_nvector, only: vector_content, content_of
+   use fsundials_nvector_mod, only: N_Vector
+   implicit none (type, external)
+   private
+   public :: callback_data, rhs_shim, weights_shim, quiet_handler, all_finite, failure_text, c_text, c_release, sundials_version
+
+   !> What the callbacks find behind `user_data`.
+   type :: callback_data
+      class(ode_system), pointer :: system => null()
+      real(wp) :: rtol = 0.0_wp
+      real(wp) :: atol = 0.0_wp
+      integer(i8) :: n_rhs = 0       !! calls of the right-hand side
+      logical :: refused = .false.   !! the last call said ok = .false.
+      logical :: not_finite = .false. !! the last call gave NaN or infinity
+      real(wp) :: t_refused = 0.0_wp !! time of the last bad call [s]
+   end type callback_data
+
+   !> Weight of a quadrature state. Not zero, because SUNDIALS inverts the weights when it chooses the first step.
+   real(wp), parameter :: no_weight = 1.0e-100_wp
+
+   interface
+      function get_version(version, length) result(flag) bind(c, name='SUNDIALSGetVersion')
+         import :: c_int, c_char
+         implicit none (type, external)
+         character(kind=c_char), intent(out) :: version(*)
+         integer(c_int), intent(in), value :: length
+         integer(c_int) :: flag
+      end function get_version
+
+      !> The C library's free.
+      subroutine c_release(address) bind(c, name='free')
+         import :: c_ptr
+         implicit none (type, external)
+         type(c_ptr), intent(in), value :: address
+      end subroutine c_release
+
+      function c_length(text) result(n) bind(c, name='strlen')
+         import :: c_ptr, c_size_t
+         implicit none (type, external)
+         type(c_ptr), intent(in), value :: text
+         integer(c_size_t) :: n
+      end function c_length
+   end interface
+
+contains
+
+   !> CVRhsFn and ARKRhsFn: 0 done, 1 recoverable (the step may be shortened).
+   function rhs_shim(t, y, ydot, user_data) result(flag) bind(c)
+      real(c_double), intent(in), value :: t
+      type(N_Vector), intent(in) :: y, ydot
+      type(c_ptr), intent(in), value :: user_data
+      integer(c_int) :: flag
+
+      type(callback_data), pointer :: data
+      type(vector_content), pointer :: states, rates
+      logical :: ok
+
+      call c_f_pointer(user_data, data)
+      states => content_of(y)
+      rates => content_of(ydot)
+      data%n_rhs = data%n_rhs + 1
+      call data%system%rhs(t, states%values, rates%values, ok)
+      flag = 0_c_int
+      if (ok) then
+         if (all_finite(rates%values)) return
+      end if
+      data%refused = .not. ok
+      data%not_finite = ok
+      data%t_refused = t
+      flag = 1_c_int
+   end function rhs_shim
+
+   !> CVEwtFn and ARKEwtFn: w = 1/(rtol |y| + atol) for the controlled states, next to nothing for the quadratures.
+   function weights_shim(y, w, user_data) result(flag) bind(c)
+      type(N_Vector), intent(in) :: y, w
+      type(c_ptr), intent(in), value :: user_data
+      integer(c_int) :: flag
+
+      type(callback_data), pointer :: data
+      type(vector_content), pointer :: states, weights
+      integer :: i
+
+      call c_f_pointer(user_data, data)
+      states => content_of(y)
+      weights => content_of(w)
+      do i = 1, states%n_controlled
+         weights%values(i) = 1.0_wp/(data%rtol*abs(states%values(i)) + data%atol)
+      end do
+      weights%values(states%n_controlled + 1:) = no_weight
+      flag = 0_c_int
+   end function weights_shim
+
+   !> CVErrHandlerFn and ARKErrHandlerFn that prints nothing: the return codes become messages of ours.
+   subroutine quiet_handler(code, module_name, function_name, message, handler_data) bind(c)
+      integer(c_int), intent(in), value :: code
+      type(c_ptr), intent(in), value :: module_name, function_name, message, handler_data
+      associate (u1 => code, u2 => module_name, u3 => function_name, u4 => message, u5 => handler_data); end associate
+   end subroutine quiet_handler
+
+   !> True if no element is NaN or infinite. x - x is 0 for all others; a NaN would raise a trap in a comparison,
+   !> so the exponent bits are looked at.
+   pure function all_finite(x) result(finite)
+      real(wp), intent(in) :: x(:)
+      logical :: finite
+      integer(i8), parameter :: exponent_bits = int(z'7FF0000000000000', i8)
+      integer(i8) :: bits
+      integer :: i
+
+      finite = .true.
+      do i = 1, size(x)
+         bits = iand(transfer(x(i), bits), exponent_bits)
+         if (bits == exponent_bits) finite = .false.
+      end do
+   end function all_finite
+
+   !> The tail of a message for a return code below zero; the codes from -1 to -11 are the same in CVODE and ARKODE.
+   pure function failure_text(flag) result(text)
+      integer(c_int), intent(in) :: flag
+      character(len=:), allocatable :: text
+      select case (flag)
+      case (-1); text = 'too many internal steps'
+      case (-2); text = 'the tolerances ask for more than the working precision'
+      case (-3); text = 'error test failures occurred too many times, or with the smallest step'
+      case (-4); text = 'the nonlinear iteration failed too many times, or with the smallest step'
+      case (-5); text = 'the linear solver could not be initialized'
+      case (-6); text = 'the Jacobian or its factorization failed'
+      case (-7); text = 'the linear solver failed'
+      case (-8); text = 'the right-hand side failed'
+      case (-9); text = 'the right-hand side failed at the first call'
+      case (-10); text = 'the right-hand side failed repeatedly'
+      case (-11); text = 'the right-hand side failed'
+      case (-20); text = 'out of memory'
+      case (-22); text = 'illegal input'
+      case (-27); text = 'the interval is too short to start in'
+      case default; text = 'failed'
+      end select
+   end function failure_text
+
+   !> A C string as text; empty for a null pointer.
+   function c_text(address) result(text)
+      type(c_ptr), intent(in) :: address
+      character(len=:), allocatable :: text
+      character(kind=c_char), pointer :: characters(:)
+      integer :: i, n
+
+      text = ''
+      if (.not. c_associated(address)) return
+      n = int(c_length(address))
+      call c_f_pointer(address, characters, [n])
+      do i = 1, n
+         text = text//characters(i)
+      end do
+   end function c_text
+
+   !> The version of the SUNDIALS library in use, like '6.4.1'.
+   function sundials_version() result(text)
+      character(len=:), allocatable :: text
+      integer, parameter :: length = 40
+      character(kind=c_char), target :: buffer(length)
+      text = 'unknown'
+      if (get_version(buffer, int(length, c_int)) == 0_c_int) text = c_text(c_loc(buffer))
+   end function sundials_version
+
+end module rodyn_sundials_base
