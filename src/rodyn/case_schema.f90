@@ -29,7 +29,8 @@ module rodyn_case_schema
       schema_row('spacecraft', 'mass', type_real, unit='kg', default='depends', rule=positive, example='122.5', &
          when="required when motion = 'free'", help='mass M0'), &
       schema_row('spacecraft', 'inertia', type_real, unit='kg m^2', default='depends', rule=positive, &
-         example='10.0', when="required when motion = 'free'", help='moment of inertia J0 about the centre of mass'), &
+         example='10.0', when="required when motion = 'free'", &
+         help='moment of inertia J0 about the centre of mass'), &
       schema_row('spacecraft', 'hinge_x', type_real, unit='m', default='0.0', &
          help='x0 of hinge 0 from the centre of mass, moving axes'), &
       schema_row('spacecraft', 'hinge_y', type_real, unit='m', default='0.0', &
@@ -38,7 +39,8 @@ module rodyn_case_schema
          help='free-floating or fixed spacecraft'), &
       schema_row('chain', 'n_rods', type_integer, rule=in_range, low=1.0_wp, high=1.0e6_wp, example='4', &
          help='number of rods n'), &
-      schema_row('chain', 'length', type_real, rods, 'm', rule=positive, example='1.5', help='length l of each rod'), &
+      schema_row('chain', 'length', type_real, rods, 'm', rule=positive, example='1.5', &
+         help='length l of each rod'), &
       schema_row('chain', 'mass_per_length', type_real, rods, 'kg/m', rule=not_negative, example='1.696', &
          help='mass per length m of each rod'), &
       schema_row('chain', 'bending_stiffness', type_real, rods, 'N m^2', default='depends', rule=positive, &
@@ -49,7 +51,8 @@ module rodyn_case_schema
          help='torsional spring C of each hinge'), &
       schema_row('chain', 'hinge_damping', type_real, hinges, 'N m s/rad', '0.0', rule=not_negative, &
          help='viscous damper D of each hinge'), &
-      schema_row('chain', 'kink', type_real, hinges, 'rad', '0.0', help='imposed break gamma of the axis at each hinge'), &
+      schema_row('chain', 'kink', type_real, hinges, 'rad', '0.0', &
+         help='imposed break gamma of the axis at each hinge'), &
       schema_row('model', 'formulation', type_word, default="'consistent'", words='consistent|paper', &
          help='every term kept, or second-order terms in bending dropped as in the article'), &
       schema_row('model', 'inertia', type_word, default="'distributed'", words='distributed|lumped', &
@@ -60,18 +63,29 @@ module rodyn_case_schema
          help='points of the quadrature rule for the rod integrals'), &
       schema_row('model', 'kernel', type_word, default="'recursive'", words='recursive|assembled', &
          help='O(n) recursion, or the assembled system and LAPACK'), &
-      schema_row('initial', 'phi', type_real, rods, 'rad', '0.0', help='angle of each chord from the moving x axis'), &
-      schema_row('initial', 'alpha', type_real, rods, 'rad', '0.0', help="slope at the inner end; bending = 'dynamic' only"), &
-      schema_row('initial', 'beta', type_real, rods, 'rad', '0.0', help="slope at the outer end; bending = 'dynamic' only"), &
+      schema_row('initial', 'phi', type_real, rods, 'rad', '0.0', &
+         help='angle of each chord from the moving x axis'), &
+      schema_row('initial', 'alpha', type_real, rods, 'rad', '0.0', &
+         help="slope at the inner end; bending = 'dynamic' only"), &
+      schema_row('initial', 'beta', type_real, rods, 'rad', '0.0', &
+         help="slope at the outer end; bending = 'dynamic' only"), &
       schema_row('initial', 'phi_rate', type_real, rods, 'rad/s', '0.0', help='rate of phi'), &
-      schema_row('initial', 'alpha_rate', type_real, rods, 'rad/s', '0.0', help="rate of alpha; bending = 'dynamic' only"), &
-      schema_row('initial', 'beta_rate', type_real, rods, 'rad/s', '0.0', help="rate of beta; bending = 'dynamic' only"), &
-      schema_row('initial', 'velocity_x', type_real, unit='m/s', default='0.0', help='Vx of the spacecraft, moving axes'), &
-      schema_row('initial', 'velocity_y', type_real, unit='m/s', default='0.0', help='Vy of the spacecraft, moving axes'), &
-      schema_row('initial', 'omega', type_real, unit='rad/s', default='0.0', help='angular velocity of the spacecraft'), &
-      schema_row('initial', 'displacement_x', type_real, unit='m', default='0.0', help='u_x of the spacecraft, moving axes'), &
-      schema_row('initial', 'displacement_y', type_real, unit='m', default='0.0', help='u_y of the spacecraft, moving axes'), &
-      schema_row('initial', 'rotation', type_real, unit='rad', default='0.0', help='rotation theta of the spacecraft'), &
+      schema_row('initial', 'alpha_rate', type_real, rods, 'rad/s', '0.0', &
+         help="rate of alpha; bending = 'dynamic' only"), &
+      schema_row('initial', 'beta_rate', type_real, rods, 'rad/s', '0.0', &
+         help="rate of beta; bending = 'dynamic' only"), &
+      schema_row('initial', 'velocity_x', type_real, unit='m/s', default='0.0', &
+         help='Vx of the spacecraft, moving axes'), &
+      schema_row('initial', 'velocity_y', type_real, unit='m/s', default='0.0', &
+         help='Vy of the spacecraft, moving axes'), &
+      schema_row('initial', 'omega', type_real, unit='rad/s', default='0.0', &
+         help='angular velocity of the spacecraft'), &
+      schema_row('initial', 'displacement_x', type_real, unit='m', default='0.0', &
+         help='u_x of the spacecraft, moving axes'), &
+      schema_row('initial', 'displacement_y', type_real, unit='m', default='0.0', &
+         help='u_y of the spacecraft, moving axes'), &
+      schema_row('initial', 'rotation', type_real, unit='rad', default='0.0', &
+         help='rotation theta of the spacecraft'), &
       schema_row('load', 'target', type_word, default="'spacecraft'", words='spacecraft|node', &
          help='where the load acts: centre of mass of the spacecraft, or a node'), &
       schema_row('load', 'node', type_integer, default='depends', rule=at_least, low=1.0_wp, &

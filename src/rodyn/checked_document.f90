@@ -6,15 +6,14 @@
 module rodyn_checked_document
    use rodyn_kinds, only: i8
    use rodyn_faults, only: fault_list
-   use rodyn_namelist_document, only: namelist_document, namelist_entry, namelist_value, find_group, group_count, &
-      index_text, shown_value, shown_values
+   use rodyn_namelist_document, only: namelist_document, namelist_entry, index_text, shown_value, shown_values
    use rodyn_schema, only: schema_extent, schema_group, schema_row, any_list, group_index, nearest_group, &
       nearest_key, one_value, row_index
    use rodyn_text, only: is_digit, printable, to_text
    use rodyn_value_rules, only: broken_rule
    implicit none (type, external)
    private
-   public :: checked_document, match_document, check_document, blame, entry_of, is_sound, max_list
+   public :: checked_document, match_document, check_document, blame, entry_of, is_sound, group_at, instances
 
    integer, parameter :: max_list = 1000000 !! most values of a list of any length
 
@@ -24,6 +23,8 @@ module rodyn_checked_document
       type(schema_group), allocatable :: groups(:)
       type(schema_row), allocatable :: rows(:)
       type(schema_extent), allocatable :: extents(:)
+      integer, allocatable :: known(:)  !! the document's groups, those of the first schema group first
+      integer, allocatable :: before(:) !! how many of `known` stand before those of each schema group (0:)
       integer, allocatable :: row(:)  !! of each entry; 0: unknown key
       logical, allocatable :: ok(:)   !! of each entry: known, and its values keep the rules
       type(fault_list) :: faults
@@ -37,9 +38,7 @@ contains
       type(schema_group), intent(in) :: groups(:)
       type(schema_row), intent(in) :: rows(:)
       type(checked_document), intent(out) :: checked
-      integer :: g, kind
-      integer :: first_line(size(groups))
-      logical :: seen(size(groups))
+      integer :: g, i
 
       checked%document => document
       checked%groups = groups
@@ -47,23 +46,78 @@ contains
       checked%faults = document%faults
       allocate (checked%row(document%n_entries), source=0)
       allocate (checked%ok(document%n_entries), source=.false.)
-      seen = .false.
-      do g = 1, document%n_groups
-         kind = group_index(groups, document%groups(g)%name)
-         if (kind == 0) then
+      call sort_groups(checked)
+      do i = 1, size(checked%known)
+         g = checked%known(i)
+         if (i > checked%before(size(groups))) then
             call complain_of_group(checked, g)
          else
-            if (.not. seen(kind)) then
-               first_line(kind) = document%groups(g)%line
-            else if (.not. groups(kind)%repeatable) then
-               call checked%faults%add(document%groups(g)%line, '&'//trim(groups(kind)%name) &
-                  //': the group may stand only once, and begins in line '//to_text(first_line(kind))//' already')
-            end if
-            seen(kind) = .true.
             call match_entries(checked, g)
          end if
       end do
+      call check_single_groups(checked)
    end subroutine match_document
+
+   !> Order the document's groups by their place in the schema, unknown ones last, so that the
+   !> k-th group of a name is found at once.
+   subroutine sort_groups(checked)
+      type(checked_document), intent(inout) :: checked
+      integer :: kind(checked%document%n_groups)
+      integer :: next(size(checked%groups) + 1)
+      integer :: g, k, n
+
+      n = size(checked%groups)
+      do g = 1, size(kind)
+         kind(g) = group_index(checked%groups, checked%document%groups(g)%name)
+         if (kind(g) == 0) kind(g) = n + 1
+      end do
+      allocate (checked%known(size(kind)))
+      allocate (checked%before(0:n), source=0)
+      do k = 1, n
+         checked%before(k) = checked%before(k - 1) + count(kind == k)
+      end do
+      next = checked%before
+      do g = 1, size(kind)
+         next(kind(g)) = next(kind(g)) + 1
+         checked%known(next(kind(g))) = g
+      end do
+   end subroutine sort_groups
+
+   !> How many groups of that name the document has.
+   integer function instances(checked, group)
+      type(checked_document), intent(in) :: checked
+      character(len=*), intent(in) :: group
+      integer :: k
+      k = group_index(checked%groups, group)
+      instances = checked%before(k) - checked%before(k - 1)
+   end function instances
+
+   !> The document's index of the `instance`-th group of that name; 0 if there is none.
+   integer function group_at(checked, group, instance)
+      type(checked_document), intent(in) :: checked
+      character(len=*), intent(in) :: group
+      integer, intent(in) :: instance
+      integer :: k
+      k = group_index(checked%groups, group)
+      group_at = 0
+      if (checked%before(k - 1) + instance > checked%before(k)) return
+      group_at = checked%known(checked%before(k - 1) + instance)
+   end function group_at
+
+   subroutine check_single_groups(checked)
+      type(checked_document), intent(inout) :: checked
+      integer :: first, i, k
+
+      do k = 1, size(checked%groups)
+         if (checked%groups(k)%repeatable) cycle
+         first = checked%before(k - 1) + 1
+         do i = first + 1, checked%before(k)
+            call checked%faults%add(checked%document%groups(checked%known(i))%line, '&'//trim(checked%groups(k)%name) &
+               //': the group may stand only once, and begins in line ' &
+               //to_text(checked%document%groups(checked%known(first))%line)//' already')
+         end do
+      end do
+   end subroutine check_single_groups
 
    subroutine complain_of_group(checked, g)
       type(checked_document), intent(inout) :: checked
@@ -129,7 +183,7 @@ contains
       do r = 1, size(checked%rows)
          if (checked%rows(r)%default /= 'required') cycle
          k = group_index(checked%groups, checked%rows(r)%group)
-         do g = 1, merge(group_count(checked%document, trim(checked%rows(r)%group)), 1, checked%groups(k)%repeatable)
+         do g = 1, merge(instances(checked, trim(checked%rows(r)%group)), 1, checked%groups(k)%repeatable)
             if (entry_of(checked, trim(checked%rows(r)%group), g, trim(checked%rows(r)%key), any_state=.true.) > 0) cycle
             call blame(checked, trim(checked%rows(r)%group), g, trim(checked%rows(r)%key), 'is required')
          end do
@@ -367,7 +421,7 @@ contains
       any_will_do = .false.
       if (present(any_state)) any_will_do = any_state
       found = 0
-      g = find_group(checked%document, group, instance)
+      g = group_at(checked, group, instance)
       if (g == 0) return
       r = row_index(checked%rows, group, key)
       do found = checked%document%groups(g)%first, checked%document%groups(g)%last
@@ -384,7 +438,7 @@ contains
       integer :: e, g, r
 
       sound = .true.
-      g = find_group(checked%document, group, instance)
+      g = group_at(checked, group, instance)
       if (g == 0) return
       r = row_index(checked%rows, group, key)
       do e = checked%document%groups(g)%first, checked%document%groups(g)%last
@@ -400,9 +454,13 @@ contains
       character(len=:), allocatable :: shown
       integer :: e, g, line
 
+      if (checked%faults%full()) then
+         call checked%faults%add(0, '') ! only counted
+         return
+      end if
       shown = ''
       line = checked%document%n_lines
-      g = find_group(checked%document, group, instance)
+      g = group_at(checked, group, instance)
       if (g > 0) line = checked%document%groups(g)%line
       e = entry_of(checked, group, instance, key)
       if (e > 0) then

@@ -163,6 +163,7 @@ contains
       else
          s%at = first + max(1, span(document%text(first:), ends_token))
          call fault_in_group(document, s%line, document%text(first:s%at - 1), 'expected a key and =')
+         if (next_character(document, s) == ',') s%at = s%at + 1
       end if
    end subroutine parse_assignment
 
@@ -171,7 +172,7 @@ contains
       integer, intent(in) :: line
       character(len=*), intent(in) :: text, rule
       call document%faults%add(line, '&'//printable(trim(document%groups(document%n_groups)%name), shown_max)//' ' &
-         //printable(text, shown_max)//': '//rule)
+         //printable(trim(text), shown_max)//': '//rule)
    end subroutine fault_in_group
 
    !> If what stands here is followed by '=', the scanner after the '='; else one with at = 0.

@@ -142,10 +142,9 @@ contains
    pure integer function row_index(rows, group, key) result(found)
       type(schema_row), intent(in) :: rows(:)
       character(len=*), intent(in) :: group, key
-      do found = 1, size(rows)
-         if (rows(found)%key == key) then
-            if (rows(found)%group == group) return
-         end if
+      do found = 1, merge(size(rows), 0, len(key) > 0)
+         if (rows(found)%key(1:1) /= key(1:1)) cycle ! cheap, and true of most
+         if (rows(found)%key == key .and. rows(found)%group == group) return
       end do
       found = 0
    end function row_index
@@ -154,7 +153,8 @@ contains
    pure integer function group_index(groups, name) result(found)
       type(schema_group), intent(in) :: groups(:)
       character(len=*), intent(in) :: name
-      do found = 1, size(groups)
+      do found = 1, merge(size(groups), 0, len(name) > 0)
+         if (groups(found)%name(1:1) /= name(1:1)) cycle ! cheap, and true of most
          if (groups(found)%name == name) return
       end do
       found = 0
