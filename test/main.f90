@@ -5,9 +5,14 @@ program tester
    use test_kernels, only: collect_kernels
    use test_motion, only: collect_motion
    use test_run_file, only: collect_run_file
-   use test_testing, only: suite_tally, unittest, run_suite
    use test_integrators, only: collect_integrators
    use test_progress, only: collect_progress
+   use test_namelist, only: collect_namelist
+   use test_namelist_faults, only: collect_namelist_faults
+   use test_namelist_fuzz, only: collect_namelist_fuzz
+   use test_case_keys, only: collect_case_keys
+   use test_case_rules, only: collect_case_rules
+   use test_case_reader, only: collect_case_reader
    implicit none (type, external)
    type(suite_tally) :: tally
    type(unittest), allocatable :: suite(:)
@@ -28,6 +33,18 @@ program tester
    call run_suite('integrators', suite, tally, trim(filter))
    call collect_progress(suite)
    call run_suite('progress', suite, tally, trim(filter))
+   call collect_namelist(suite)
+   call run_suite('namelist', suite, tally, trim(filter))
+   call collect_namelist_faults(suite)
+   call run_suite('namelist_faults', suite, tally, trim(filter))
+   call collect_namelist_fuzz(suite)
+   call run_suite('namelist_fuzz', suite, tally, trim(filter))
+   call collect_case_keys(suite)
+   call run_suite('case_keys', suite, tally, trim(filter))
+   call collect_case_rules(suite)
+   call run_suite('case_rules', suite, tally, trim(filter))
+   call collect_case_reader(suite)
+   call run_suite('case_reader', suite, tally, trim(filter))
 
    write (*, '(i0, " passed, ", i0, " failed")') tally%passed, tally%failed
    if (tally%failed > 0 .or. tally%passed == 0) stop 1, quiet=.true.

@@ -1,0 +1,251 @@
+!> Fills a case from a checked document: defaults, then what the file says, then single elements.
+module rodyn_case_loader
+   use rodyn_kinds, only: wp
+   use rodyn_case_visitor, only: case_visitor
+   use rodyn_checked_document, only: checked_document, group_at
+   use rodyn_namelist_document, only: namelist_value, string_content
+   use rodyn_schema, only: any_list
+   use rodyn_text, only: word
+   use rodyn_value_rules, only: matching_word
+   implicit none (type, external)
+   private
+   public :: case_loader
+
+   !> Values that break a rule are passed over: their key keeps its default, and the fault is on the list already.
+   type, extends(case_visitor) :: case_loader
+      type(checked_document), pointer :: checked => null()
+      integer :: group = 0 !! the open group of the document; 0: not in the file
+      integer :: row = 0   !! the row visited last; rows are visited in the order of the table
+   contains
+      procedure :: open_group
+      procedure :: close_group
+      procedure :: real_field
+      procedure :: array_field
+      procedure :: integer_field
+      procedure :: logical_field
+      procedure :: word_field
+      procedure :: text_field
+   end type case_loader
+
+contains
+
+   subroutine open_group(self, group, instance)
+      class(case_loader), intent(inout) :: self
+      character(len=*), intent(in) :: group
+      integer, intent(in) :: instance
+      integer :: r
+
+      self%group = group_at(self%checked, group, instance)
+      do r = 1, size(self%checked%rows)
+         if (self%checked%rows(r)%group == group) exit
+      end do
+      self%row = r - 1
+   end subroutine open_group
+
+   subroutine close_group(self)
+      class(case_loader), intent(inout) :: self
+      self%group = 0
+   end subroutine close_group
+
+   !> Go to the row of a key, and find the last valid entry for it; 0 if there is none.
+   integer function find(self, key) result(found)
+      class(case_loader), intent(inout) :: self
+      character(len=*), intent(in) :: key
+
+      found = 0
+      do while (self%checked%rows(self%row + 1)%key /= key)
+         self%row = self%row + 1
+      end do
+      self%row = self%row + 1
+      if (self%group == 0) return
+      associate (group => self%checked%document%groups(self%group))
+         do found = group%last, group%first, -1
+            if (self%checked%row(found) == self%row .and. self%checked%ok(found)) return
+         end do
+      end associate
+      found = 0
+   end function find
+
+   !> The one value of an entry.
+   function value_of(self, entry) result(value)
+      class(case_loader), intent(in) :: self
+      integer, intent(in) :: entry
+      type(namelist_value) :: value
+      value = self%checked%document%values(self%checked%document%entries(entry)%first)
+   end function value_of
+
+   !> Does the row have a default value of its own?
+   logical function has_default(self)
+      class(case_loader), intent(in) :: self
+      associate (default => self%checked%rows(self%row)%default)
+         has_default = default /= 'required' .and. default /= 'depends'
+      end associate
+   end function has_default
+
+   subroutine set_default(self, x)
+      class(case_loader), intent(in) :: self
+      real(wp), intent(inout) :: x !! as it is if the row has no default
+      if (.not. has_default(self)) return
+      x = 0.0_wp
+      if (self%checked%rows(self%row)%default == '0.0') return
+      read (self%checked%rows(self%row)%default, *) x
+   end subroutine set_default
+
+   subroutine real_field(self, key, x)
+      class(case_loader), intent(inout) :: self
+      character(len=*), intent(in) :: key
+      real(wp), intent(inout) :: x
+      type(namelist_value) :: value
+      integer :: e
+
+      e = find(self, key)
+      if (e > 0) then
+         value = value_of(self, e)
+         x = value%x
+      else
+         call set_default(self, x)
+      end if
+   end subroutine real_field
+
+   !> Arrays over an extent get its length; lists the length they have in the file.
+   subroutine array_field(self, key, x)
+      class(case_loader), intent(inout) :: self
+      character(len=*), intent(in) :: key
+      real(wp), allocatable, intent(inout) :: x(:)
+      real(wp) :: default
+      integer :: e, extent, last
+
+      last = find(self, key)
+      extent = self%checked%rows(self%row)%extent
+      if (allocated(x)) deallocate (x)
+      if (extent == any_list) then
+         allocate (x(list_length(self, last)))
+         if (last > 0) call spread_values(self, last, x)
+         return
+      end if
+      default = 0.0_wp
+      call set_default(self, default)
+      associate (range => self%checked%extents(extent))
+         allocate (x(range%lower:range%lower + range%count - 1), source=default)
+         if (last == 0 .or. range%count == 0) return
+      end associate
+      do e = self%checked%document%groups(self%group)%first, last
+         if (takes(self, e, .false.)) call spread_values(self, e, x)
+      end do
+      do e = self%checked%document%groups(self%group)%first, last
+         associate (entry => self%checked%document%entries(e))
+            if (takes(self, e, .true.)) call spread_values(self, e, x(entry%lower:entry%upper))
+         end associate
+      end do
+   end subroutine array_field
+
+   !> Is this a valid entry for the row, with or without an index?
+   logical function takes(self, entry, indexed)
+      class(case_loader), intent(in) :: self
+      integer, intent(in) :: entry
+      logical, intent(in) :: indexed
+      takes = self%checked%row(entry) == self%row .and. self%checked%ok(entry) .and. &
+         (self%checked%document%entries(entry)%indexed .eqv. indexed)
+   end function takes
+
+   integer function list_length(self, entry)
+      class(case_loader), intent(in) :: self
+      integer, intent(in) :: entry !! 0: none
+      list_length = 0
+      if (entry == 0) return
+      associate (e => self%checked%document%entries(entry))
+         list_length = sum(self%checked%document%values(e%first:e%last)%copies)
+      end associate
+   end function list_length
+
+   !> Write out the repeat counts of an entry; one single value fills all of `x`.
+   subroutine spread_values(self, entry, x)
+      class(case_loader), intent(in) :: self
+      integer, intent(in) :: entry
+      real(wp), intent(inout) :: x(:)
+      integer :: at, v
+
+      at = 0
+      associate (e => self%checked%document%entries(entry), values => self%checked%document%values)
+         if (e%first == e%last .and. values(e%first)%copies == 1) then
+            x = values(e%first)%x
+            return
+         end if
+         do v = e%first, e%last
+            x(at + 1:at + values(v)%copies) = values(v)%x
+            at = at + values(v)%copies
+         end do
+      end associate
+   end subroutine spread_values
+
+   subroutine integer_field(self, key, x)
+      class(case_loader), intent(inout) :: self
+      character(len=*), intent(in) :: key
+      integer, intent(inout) :: x
+      type(namelist_value) :: value
+      integer :: e
+
+      e = find(self, key)
+      if (e > 0) then
+         value = value_of(self, e)
+         x = value%number
+      else if (has_default(self)) then
+         read (self%checked%rows(self%row)%default, *) x
+      end if
+   end subroutine integer_field
+
+   subroutine logical_field(self, key, x)
+      class(case_loader), intent(inout) :: self
+      character(len=*), intent(in) :: key
+      logical, intent(inout) :: x
+      type(namelist_value) :: value
+      integer :: e
+
+      e = find(self, key)
+      if (e > 0) then
+         value = value_of(self, e)
+         x = value%truth
+      else if (has_default(self)) then
+         x = self%checked%rows(self%row)%default == '.true.'
+      end if
+   end subroutine logical_field
+
+   !> A word takes the spelling of the table.
+   subroutine word_field(self, key, x)
+      class(case_loader), intent(inout) :: self
+      character(len=*), intent(in) :: key
+      character(len=*), intent(inout) :: x
+      integer :: e
+
+      e = find(self, key)
+      associate (row => self%checked%rows(self%row))
+         if (e > 0) then
+            x = word(row%words, matching_word(row, string_content(self%checked%document, value_of(self, e))))
+         else if (has_default(self)) then
+            x = unquoted(row%default)
+         end if
+      end associate
+   end subroutine word_field
+
+   subroutine text_field(self, key, x)
+      class(case_loader), intent(inout) :: self
+      character(len=*), intent(in) :: key
+      character(len=:), allocatable, intent(inout) :: x
+      integer :: e
+
+      e = find(self, key)
+      if (e > 0) then
+         x = string_content(self%checked%document, value_of(self, e))
+      else if (has_default(self)) then
+         x = unquoted(self%checked%rows(self%row)%default)
+      end if
+   end subroutine text_field
+
+   !> The text between the quotes of a default.
+   pure function unquoted(default) result(text)
+      character(len=*), intent(in) :: default
+      character(len=:), allocatable :: text
+      text = default(2:len_trim(default) - 1)
+   end function unquoted
+
+end module rodyn_case_loader

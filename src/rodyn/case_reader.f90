@@ -1,0 +1,119 @@
+!> From a case file to a `case_config`: strict, and with every fault of the file in one error.
+!>
+!>     call read_case('table1.nml', config, text, error)
+!>     if (allocated(error)) print '(a)', error%message   ! table1.nml:12: &chain length(3) = -1.5: must be positive [m]
+!>
+!> For many variants of one file, parse it once, set keys, and build each case from the document:
+!>
+!>     call parse_document(text, 'table1.nml', document)
+!>     call set_value(document, 'chain.hinge_stiffness(0)', '7000.0', error)
+!>     call case_from_document(document, config, error)
+module rodyn_case_reader
+   use rodyn_case_config, only: case_config
+   use rodyn_case_loader, only: case_loader
+   use rodyn_case_rules, only: check_case
+   use rodyn_case_schema, only: case_extents, case_groups, case_rows
+   use rodyn_case_visitor, only: visit_case
+   use rodyn_case_writer, only: resolved_case
+   use rodyn_checked_document, only: checked_document, check_document, entry_of, instances, match_document
+   use rodyn_defaults_text, only: defaults_text
+   use rodyn_errors, only: error_type
+   use rodyn_file_text, only: read_text_file
+   use rodyn_namelist_document, only: namelist_document, is_integer
+   use rodyn_namelist_edit, only: set_value
+   use rodyn_namelist_parser, only: parse_document
+   use rodyn_schema, only: row_index, satisfies
+   implicit none (type, external)
+   private
+   public :: read_case, parse_case, case_from_document
+   public :: resolved_case, default_case
+   public :: namelist_document, parse_document, set_value
+
+   character(len=*), parameter :: nl = new_line('a')
+   character(len=*), parameter :: heading = &
+      '! A case of Rodyn: every key, with its default or an example. SI units, angles in radians.'//nl// &
+      '! Keys that may be left out are shown with their defaults; keys behind a ! do not apply to this example.'//nl
+
+contains
+
+   !> Read, check and complete a case file.
+   subroutine read_case(path, config, input_text, error)
+      character(len=*), intent(in) :: path
+      type(case_config), intent(out) :: config
+      character(len=:), allocatable, intent(out), optional :: input_text !! the file as it is
+      type(error_type), allocatable, intent(out) :: error !! exit code 2, all faults
+      character(len=:), allocatable :: text
+
+      call read_text_file(path, text, error)
+      if (allocated(error)) return
+      call parse_case(text, path, config, error)
+      if (present(input_text)) call move_alloc(text, input_text)
+   end subroutine read_case
+
+   !> The same from text in memory.
+   subroutine parse_case(text, name, config, error)
+      character(len=*), intent(in) :: text
+      character(len=*), intent(in) :: name !! what messages call the text
+      type(case_config), intent(out) :: config
+      type(error_type), allocatable, intent(out) :: error
+      type(namelist_document) :: document
+
+      call parse_document(text, name, document)
+      call case_from_document(document, config, error)
+   end subroutine parse_case
+
+   !> The same from a parsed document, perhaps with values set since.
+   subroutine case_from_document(document, config, error)
+      type(namelist_document), intent(in), target :: document
+      type(case_config), intent(out) :: config
+      type(error_type), allocatable, intent(out) :: error
+      type(checked_document), target :: checked
+      type(case_loader) :: loader
+
+      call match_document(document, case_groups, case_rows, checked)
+      call check_document(checked, case_extents(rods_of(checked)))
+      loader%checked => checked
+      allocate (config%loads(instances(checked, 'load')))
+      call visit_case(loader, config)
+      call complete_loads(checked, config)
+      call check_case(checked, config)
+      call checked%faults%to_error(document%name, error)
+   end subroutine case_from_document
+
+   !> The number of rods if it is given rightly, else 0: everything that depends on it is then left unchecked.
+   integer function rods_of(checked)
+      type(checked_document), intent(in) :: checked
+      integer :: e
+
+      rods_of = 0
+      e = entry_of(checked, 'chain', 1, 'n_rods')
+      if (e == 0) return
+      associate (entry => checked%document%entries(e), values => checked%document%values)
+         if (entry%first /= entry%last .or. values(entry%first)%kind /= is_integer) return
+         if (.not. satisfies(case_rows(row_index(case_rows, 'chain', 'n_rods')), values(entry%first)%x)) return
+         rods_of = values(entry%first)%number
+      end associate
+   end function rods_of
+
+   !> Defaults of a load that come from other keys.
+   subroutine complete_loads(checked, config)
+      type(checked_document), intent(in) :: checked
+      type(case_config), intent(inout) :: config
+      integer :: i
+
+      do i = 1, size(config%loads)
+         associate (load => config%loads(i))
+            if (entry_of(checked, 'load', i, 't_end') == 0) load%t_end = config%t_end
+            if (load%law == 'smooth_step' .and. entry_of(checked, 'load', i, 'rise_time') == 0) &
+               load%rise_time = load%t_end - load%t_start
+         end associate
+      end do
+   end subroutine complete_loads
+
+   !> A complete commented case that runs as it is.
+   function default_case() result(text)
+      character(len=:), allocatable :: text
+      text = defaults_text(case_groups, case_rows, case_extents(0), heading)
+   end function default_case
+
+end module rodyn_case_reader

@@ -1,0 +1,222 @@
+!> Rules that tie several keys of a case together. What one key alone must keep stands in the table.
+module rodyn_case_rules
+   use rodyn_kinds, only: wp
+   use rodyn_case_config, only: case_config, load_config
+   use rodyn_case_visitor, only: law_takes
+   use rodyn_checked_document, only: checked_document, blame, entry_of, is_sound
+   use rodyn_text, only: to_text
+   implicit none (type, external)
+   private
+   public :: check_case
+
+   character(len=*), parameter :: law_keys(5) = [character(len=9) :: 'value', 'rate', 'rise_time', 'times', 'values']
+
+contains
+
+   !> Note everything that is wrong with the case as a whole.
+   subroutine check_case(checked, config)
+      type(checked_document), intent(inout) :: checked
+      type(case_config), intent(in) :: config
+      integer :: i
+
+      call check_spacecraft(checked, config)
+      call check_model(checked, config)
+      call check_bending(checked, config)
+      call check_solver(checked, config)
+      do i = 1, size(config%loads)
+         call check_target(checked, i, config%loads(i), config%chain%n_rods)
+         call check_law_keys(checked, i, config%loads(i))
+         call check_times(checked, i, config%loads(i))
+         if (config%loads(i)%law == 'table') call check_table(checked, i, config%loads(i))
+      end do
+   end subroutine check_case
+
+   !> Is the key given, rightly or wrongly?
+   logical function given(checked, group, instance, key)
+      type(checked_document), intent(in) :: checked
+      character(len=*), intent(in) :: group, key
+      integer, intent(in) :: instance
+      given = entry_of(checked, group, instance, key, any_state=.true.) > 0
+   end function given
+
+   subroutine require(checked, group, instance, key, reason)
+      type(checked_document), intent(inout) :: checked
+      character(len=*), intent(in) :: group, key, reason
+      integer, intent(in) :: instance
+      if (.not. given(checked, group, instance, key)) call blame(checked, group, instance, key, 'is required '//reason)
+   end subroutine require
+
+   !> A free spacecraft has mass and inertia; a fixed one does not move.
+   subroutine check_spacecraft(checked, config)
+      type(checked_document), intent(inout) :: checked
+      type(case_config), intent(in) :: config
+
+      if (.not. is_sound(checked, 'spacecraft', 1, 'motion')) return
+      if (config%spacecraft%motion == 'free') then
+         call require(checked, 'spacecraft', 1, 'mass', "when motion = 'free'")
+         call require(checked, 'spacecraft', 1, 'inertia', "when motion = 'free'")
+         return
+      end if
+      call require_zero('velocity_x', config%initial%velocity_x)
+      call require_zero('velocity_y', config%initial%velocity_y)
+      call require_zero('omega', config%initial%omega)
+      call require_zero('displacement_x', config%initial%displacement_x)
+      call require_zero('displacement_y', config%initial%displacement_y)
+      call require_zero('rotation', config%initial%rotation)
+
+   contains
+
+      subroutine require_zero(key, x)
+         character(len=*), intent(in) :: key
+         real(wp), intent(in) :: x
+         if (abs(x) > 0.0_wp) call blame(checked, 'initial', 1, key, "must be 0 when motion = 'fixed'")
+      end subroutine require_zero
+
+   end subroutine check_spacecraft
+
+   !> MODEL sec. 5: which bending goes with which inertia.
+   subroutine check_model(checked, config)
+      type(checked_document), intent(inout) :: checked
+      type(case_config), intent(in) :: config
+      character(len=:), allocatable :: key
+
+      if (.not. (is_sound(checked, 'model', 1, 'bending') .and. is_sound(checked, 'model', 1, 'inertia'))) return
+      key = 'bending'
+      if (.not. given(checked, 'model', 1, key)) key = 'inertia'
+      if (config%model%bending == 'dynamic' .and. config%model%inertia == 'lumped') then
+         call blame(checked, 'model', 1, key, "bending = 'dynamic' is not possible with inertia = 'lumped'; " &
+            //"take 'quasistatic' or 'rigid'")
+      else if (config%model%bending == 'quasistatic' .and. config%model%inertia == 'distributed') then
+         call blame(checked, 'model', 1, key, "bending = 'quasistatic' is not possible with inertia = 'distributed'; " &
+            //"take 'dynamic' or 'rigid', or inertia = 'lumped'")
+      end if
+   end subroutine check_model
+
+   !> Only dynamic bending has slopes of its own; only rigid rods need no stiffness.
+   subroutine check_bending(checked, config)
+      type(checked_document), intent(inout) :: checked
+      type(case_config), intent(in) :: config
+
+      if (.not. is_sound(checked, 'model', 1, 'bending')) return
+      if (config%model%bending /= 'rigid') call require(checked, 'chain', 1, 'bending_stiffness', &
+         "unless bending = 'rigid'")
+      if (config%model%bending == 'dynamic') return
+      call require_zero('alpha', config%initial%alpha)
+      call require_zero('beta', config%initial%beta)
+      call require_zero('alpha_rate', config%initial%alpha_rate)
+      call require_zero('beta_rate', config%initial%beta_rate)
+
+   contains
+
+      subroutine require_zero(key, x)
+         character(len=*), intent(in) :: key
+         real(wp), intent(in) :: x(:)
+         if (any(abs(x) > 0.0_wp)) call blame(checked, 'initial', 1, key, &
+            "must be 0 when bending = '"//trim(config%model%bending)//"'")
+      end subroutine require_zero
+
+   end subroutine check_bending
+
+   subroutine check_solver(checked, config)
+      type(checked_document), intent(inout) :: checked
+      type(case_config), intent(in) :: config
+      if (.not. is_sound(checked, 'solver', 1, 'method')) return
+      if (config%solver%fixed_step > 0.0_wp .and. config%solver%method /= 'erk') &
+         call blame(checked, 'solver', 1, 'fixed_step', "is possible with method = 'erk' only")
+   end subroutine check_solver
+
+   !> A load on a node needs an existing node and is a force.
+   subroutine check_target(checked, i, load, n_rods)
+      type(checked_document), intent(inout) :: checked
+      integer, intent(in) :: i !! which load
+      type(load_config), intent(in) :: load
+      integer, intent(in) :: n_rods !! 0: not known
+
+      if (.not. is_sound(checked, 'load', i, 'target')) return
+      if (load%target == 'spacecraft') then
+         if (given(checked, 'load', i, 'node')) call blame(checked, 'load', i, 'node', "goes with target = 'node' only")
+         return
+      end if
+      call require(checked, 'load', i, 'node', "when target = 'node'")
+      if (n_rods > 0 .and. load%node > n_rods) call blame(checked, 'load', i, 'node', &
+         'there is no such node; they are numbered 1..'//to_text(n_rods))
+      if (load%component /= 'M' .or. .not. is_sound(checked, 'load', i, 'component')) return
+      call blame(checked, 'load', i, 'component', &
+         "must be 'X' or 'Y' when target = 'node'; moments act on the spacecraft only")
+   end subroutine check_target
+
+   !> Each law has its own keys and takes no others.
+   subroutine check_law_keys(checked, i, load)
+      type(checked_document), intent(inout) :: checked
+      integer, intent(in) :: i
+      type(load_config), intent(in) :: load
+      character(len=:), allocatable :: key
+      integer :: k
+
+      if (.not. is_sound(checked, 'load', i, 'law')) return
+      do k = 1, size(law_keys)
+         key = trim(law_keys(k))
+         if (.not. law_takes(load%law, key)) then
+            if (given(checked, 'load', i, key)) call blame(checked, 'load', i, key, &
+               "does not go with law = '"//trim(load%law)//"'")
+         else if (key /= 'rise_time') then
+            call require(checked, 'load', i, key, "when law = '"//trim(load%law)//"'")
+         end if
+      end do
+   end subroutine check_law_keys
+
+   !> The load must not end before it begins, and a smooth step must fit in between.
+   subroutine check_times(checked, i, load)
+      type(checked_document), intent(inout) :: checked
+      integer, intent(in) :: i
+      type(load_config), intent(in) :: load
+
+      if (.not. (is_sound(checked, 'load', i, 't_start') .and. is_sound(checked, 'load', i, 't_end'))) return
+      if (.not. given(checked, 'load', i, 't_end') .and. .not. is_sound(checked, 'case', 1, 't_end')) return
+      if (load%t_start > load%t_end) then
+         if (given(checked, 'load', i, 't_start')) then
+            call blame(checked, 'load', i, 't_start', 'must not be after t_end = '//short(load%t_end)//' [s]')
+         else
+            call blame(checked, 'load', i, 't_end', 'must not be before t_start = '//short(load%t_start)//' [s]')
+         end if
+      else if (load%law == 'smooth_step' .and. is_sound(checked, 'load', i, 'rise_time') .and. &
+               is_sound(checked, 'load', i, 'law')) then
+         if (load%rise_time > load%t_end - load%t_start) then
+            call blame(checked, 'load', i, 'rise_time', 'must not exceed t_end - t_start = ' &
+               //short(load%t_end - load%t_start)//' [s]')
+         else if (.not. load%rise_time > 0.0_wp) then
+            call blame(checked, 'load', i, 'rise_time', 'must be positive, but t_end = t_start [s]')
+         end if
+      end if
+   end subroutine check_times
+
+   !> As many values as times, two at least, and times that increase.
+   subroutine check_table(checked, i, load)
+      type(checked_document), intent(inout) :: checked
+      integer, intent(in) :: i
+      type(load_config), intent(in) :: load
+      integer :: k
+
+      if (entry_of(checked, 'load', i, 'times') == 0) return
+      if (size(load%times) < 2) call blame(checked, 'load', i, 'times', 'must be two values at least')
+      if (entry_of(checked, 'load', i, 'values') > 0 .and. size(load%values) /= size(load%times)) &
+         call blame(checked, 'load', i, 'values', 'must be as many as times: '//to_text(size(load%times))//', not ' &
+         //to_text(size(load%values)))
+      do k = 2, size(load%times)
+         if (load%times(k) > load%times(k - 1)) cycle
+         call blame(checked, 'load', i, 'times', 'must increase, but value '//to_text(k)//', '//short(load%times(k)) &
+            //', follows '//short(load%times(k - 1))//' [s]')
+         return
+      end do
+   end subroutine check_table
+
+   !> A number for a message, six significant digits.
+   pure function short(x) result(text)
+      real(wp), intent(in) :: x
+      character(len=:), allocatable :: text
+      character(len=16) :: digits
+      write (digits, '(g0.6)') x
+      text = trim(adjustl(digits))
+   end function short
+
+end module rodyn_case_rules

@@ -1,0 +1,232 @@
+!> Walks through all keys of a case in the order of the table. A loader fills the case on its way, a writer
+!> prints it: so there is one list that ties keys to components.
+module rodyn_case_visitor
+   use rodyn_kinds, only: wp
+   use rodyn_case_config, only: case_config, chain_config, initial_config, load_config, model_config, &
+      output_config, solver_config, spacecraft_config
+   implicit none (type, external)
+   private
+   public :: case_visitor, visit_case, law_takes
+
+   !> What is done at each key
+   type, abstract :: case_visitor
+   contains
+      procedure(open_interface), deferred :: open_group
+      procedure(close_interface), deferred :: close_group
+      procedure(real_interface), deferred :: real_field
+      procedure(array_interface), deferred :: array_field
+      procedure(integer_interface), deferred :: integer_field
+      procedure(logical_interface), deferred :: logical_field
+      procedure(word_interface), deferred :: word_field
+      procedure(text_interface), deferred :: text_field
+      generic :: field => real_field, array_field, integer_field, logical_field
+   end type case_visitor
+
+   abstract interface
+      subroutine open_interface(self, group, instance)
+         import :: case_visitor
+         implicit none (type, external)
+         class(case_visitor), intent(inout) :: self
+         character(len=*), intent(in) :: group
+         integer, intent(in) :: instance !! 1, 2, ... of a repeated group
+      end subroutine open_interface
+
+      subroutine close_interface(self)
+         import :: case_visitor
+         implicit none (type, external)
+         class(case_visitor), intent(inout) :: self
+      end subroutine close_interface
+
+      subroutine real_interface(self, key, x)
+         import :: case_visitor, wp
+         implicit none (type, external)
+         class(case_visitor), intent(inout) :: self
+         character(len=*), intent(in) :: key
+         real(wp), intent(inout) :: x
+      end subroutine real_interface
+
+      subroutine array_interface(self, key, x)
+         import :: case_visitor, wp
+         implicit none (type, external)
+         class(case_visitor), intent(inout) :: self
+         character(len=*), intent(in) :: key
+         real(wp), allocatable, intent(inout) :: x(:)
+      end subroutine array_interface
+
+      subroutine integer_interface(self, key, x)
+         import :: case_visitor
+         implicit none (type, external)
+         class(case_visitor), intent(inout) :: self
+         character(len=*), intent(in) :: key
+         integer, intent(inout) :: x
+      end subroutine integer_interface
+
+      subroutine logical_interface(self, key, x)
+         import :: case_visitor
+         implicit none (type, external)
+         class(case_visitor), intent(inout) :: self
+         character(len=*), intent(in) :: key
+         logical, intent(inout) :: x
+      end subroutine logical_interface
+
+      subroutine word_interface(self, key, x)
+         import :: case_visitor
+         implicit none (type, external)
+         class(case_visitor), intent(inout) :: self
+         character(len=*), intent(in) :: key
+         character(len=*), intent(inout) :: x
+      end subroutine word_interface
+
+      subroutine text_interface(self, key, x)
+         import :: case_visitor
+         implicit none (type, external)
+         class(case_visitor), intent(inout) :: self
+         character(len=*), intent(in) :: key
+         character(len=:), allocatable, intent(inout) :: x
+      end subroutine text_interface
+   end interface
+
+contains
+
+   !> Visit every key of a case whose `loads` have been allocated.
+   subroutine visit_case(visitor, config)
+      class(case_visitor), intent(inout) :: visitor
+      type(case_config), intent(inout) :: config
+      integer :: i
+
+      call visitor%open_group('case', 1)
+      call visitor%text_field('title', config%title)
+      call visitor%field('t_end', config%t_end)
+      call visitor%field('n_outputs', config%n_outputs)
+      call visitor%close_group()
+      call visit_spacecraft(visitor, config%spacecraft)
+      call visit_chain(visitor, config%chain)
+      call visit_model(visitor, config%model)
+      call visit_initial(visitor, config%initial)
+      do i = 1, size(config%loads)
+         call visit_load(visitor, i, config%loads(i))
+      end do
+      call visit_solver(visitor, config%solver)
+      call visit_output(visitor, config%output)
+   end subroutine visit_case
+
+   subroutine visit_spacecraft(visitor, spacecraft)
+      class(case_visitor), intent(inout) :: visitor
+      type(spacecraft_config), intent(inout) :: spacecraft
+      call visitor%open_group('spacecraft', 1)
+      call visitor%field('mass', spacecraft%mass)
+      call visitor%field('inertia', spacecraft%inertia)
+      call visitor%field('hinge_x', spacecraft%hinge_x)
+      call visitor%field('hinge_y', spacecraft%hinge_y)
+      call visitor%word_field('motion', spacecraft%motion)
+      call visitor%close_group()
+   end subroutine visit_spacecraft
+
+   subroutine visit_chain(visitor, chain)
+      class(case_visitor), intent(inout) :: visitor
+      type(chain_config), intent(inout) :: chain
+      call visitor%open_group('chain', 1)
+      call visitor%field('n_rods', chain%n_rods)
+      call visitor%field('length', chain%length)
+      call visitor%field('mass_per_length', chain%mass_per_length)
+      call visitor%field('bending_stiffness', chain%bending_stiffness)
+      call visitor%field('node_mass', chain%node_mass)
+      call visitor%field('hinge_stiffness', chain%hinge_stiffness)
+      call visitor%field('hinge_damping', chain%hinge_damping)
+      call visitor%field('kink', chain%kink)
+      call visitor%close_group()
+   end subroutine visit_chain
+
+   subroutine visit_model(visitor, model)
+      class(case_visitor), intent(inout) :: visitor
+      type(model_config), intent(inout) :: model
+      call visitor%open_group('model', 1)
+      call visitor%word_field('formulation', model%formulation)
+      call visitor%word_field('inertia', model%inertia)
+      call visitor%word_field('bending', model%bending)
+      call visitor%field('gauss_points', model%gauss_points)
+      call visitor%word_field('kernel', model%kernel)
+      call visitor%close_group()
+   end subroutine visit_model
+
+   subroutine visit_initial(visitor, initial)
+      class(case_visitor), intent(inout) :: visitor
+      type(initial_config), intent(inout) :: initial
+      call visitor%open_group('initial', 1)
+      call visitor%field('phi', initial%phi)
+      call visitor%field('alpha', initial%alpha)
+      call visitor%field('beta', initial%beta)
+      call visitor%field('phi_rate', initial%phi_rate)
+      call visitor%field('alpha_rate', initial%alpha_rate)
+      call visitor%field('beta_rate', initial%beta_rate)
+      call visitor%field('velocity_x', initial%velocity_x)
+      call visitor%field('velocity_y', initial%velocity_y)
+      call visitor%field('omega', initial%omega)
+      call visitor%field('displacement_x', initial%displacement_x)
+      call visitor%field('displacement_y', initial%displacement_y)
+      call visitor%field('rotation', initial%rotation)
+      call visitor%close_group()
+   end subroutine visit_initial
+
+   !> Only the keys that the target and the law of this load have.
+   subroutine visit_load(visitor, instance, load)
+      class(case_visitor), intent(inout) :: visitor
+      integer, intent(in) :: instance
+      type(load_config), intent(inout) :: load
+      call visitor%open_group('load', instance)
+      call visitor%word_field('target', load%target)
+      if (load%target == 'node') call visitor%field('node', load%node)
+      call visitor%word_field('component', load%component)
+      call visitor%word_field('law', load%law)
+      call visitor%field('t_start', load%t_start)
+      call visitor%field('t_end', load%t_end)
+      if (law_takes(load%law, 'value')) call visitor%field('value', load%value)
+      if (law_takes(load%law, 'rate')) call visitor%field('rate', load%rate)
+      if (law_takes(load%law, 'rise_time')) call visitor%field('rise_time', load%rise_time)
+      if (law_takes(load%law, 'times')) call visitor%field('times', load%times)
+      if (law_takes(load%law, 'values')) call visitor%field('values', load%values)
+      call visitor%close_group()
+   end subroutine visit_load
+
+   subroutine visit_solver(visitor, solver)
+      class(case_visitor), intent(inout) :: visitor
+      type(solver_config), intent(inout) :: solver
+      call visitor%open_group('solver', 1)
+      call visitor%word_field('method', solver%method)
+      call visitor%field('rtol', solver%rtol)
+      call visitor%field('atol', solver%atol)
+      call visitor%field('order', solver%order)
+      call visitor%field('max_step', solver%max_step)
+      call visitor%field('fixed_step', solver%fixed_step)
+      call visitor%field('max_steps', solver%max_steps)
+      call visitor%close_group()
+   end subroutine visit_solver
+
+   subroutine visit_output(visitor, output)
+      class(case_visitor), intent(inout) :: visitor
+      type(output_config), intent(inout) :: output
+      call visitor%open_group('output', 1)
+      call visitor%text_field('file', output%file)
+      call visitor%field('ledger', output%ledger)
+      call visitor%field('compression', output%compression)
+      call visitor%close_group()
+   end subroutine visit_output
+
+   !> Which of the keys value, rate, rise_time, times and values a law has.
+   pure logical function law_takes(law, key)
+      character(len=*), intent(in) :: law, key
+      select case (law)
+      case ('constant')
+         law_takes = key == 'value'
+      case ('sine_squared')
+         law_takes = key == 'value' .or. key == 'rate'
+      case ('smooth_step')
+         law_takes = key == 'value' .or. key == 'rise_time'
+      case ('table')
+         law_takes = key == 'times' .or. key == 'values'
+      case default
+         law_takes = .false.
+      end select
+   end function law_takes
+
+end module rodyn_case_visitor

@@ -1,0 +1,151 @@
+!> Small services on text: case, numbers as text, quotes, nearest names.
+module rodyn_text
+   use rodyn_kinds, only: wp
+   implicit none (type, external)
+   private
+   public :: lower, is_name, is_digit
+   public :: to_text, quoted, printable
+   public :: edit_distance, word_count, word
+
+   !> A number as the shortest text (integer), or with 17 significant digits (real), or as T or F.
+   interface to_text
+      module procedure integer_text
+      module procedure real_text
+      module procedure logical_text
+   end interface to_text
+
+contains
+
+   !> ASCII letters in lower case; everything else as it is.
+   pure function lower(text) result(small)
+      character(len=*), intent(in) :: text
+      character(len=len(text)) :: small
+      integer :: i, code
+
+      do i = 1, len(text)
+         code = iachar(text(i:i))
+         if (code >= iachar('A') .and. code <= iachar('Z')) code = code + 32
+         small(i:i) = achar(code)
+      end do
+   end function lower
+
+   pure logical function is_digit(c)
+      character(len=1), intent(in) :: c
+      is_digit = c >= '0' .and. c <= '9'
+   end function is_digit
+
+   !> Is the text a Fortran name in lower case?
+   pure logical function is_name(text)
+      character(len=*), intent(in) :: text
+      is_name = .false.
+      if (len(text) == 0) return
+      if (text(1:1) < 'a' .or. text(1:1) > 'z') return
+      is_name = verify(text, 'abcdefghijklmnopqrstuvwxyz0123456789_') == 0
+   end function is_name
+
+   pure function integer_text(i) result(text)
+      integer, intent(in) :: i
+      character(len=:), allocatable :: text
+      character(len=12) :: digits
+      write (digits, '(i0)') i
+      text = trim(digits)
+   end function integer_text
+
+   !> 17 significant digits: reading them back gives the same number.
+   pure function real_text(x) result(text)
+      real(wp), intent(in) :: x
+      character(len=:), allocatable :: text
+      character(len=25) :: digits
+      write (digits, '(es25.16e3)') x
+      text = trim(adjustl(digits))
+   end function real_text
+
+   pure function logical_text(x) result(text)
+      logical, intent(in) :: x
+      character(len=:), allocatable :: text
+      text = '.false.'
+      if (x) text = '.true.'
+   end function logical_text
+
+   !> A namelist string: in quotes, inner quotes doubled.
+   pure function quoted(text) result(string)
+      character(len=*), intent(in) :: text
+      character(len=:), allocatable :: string
+      character(len=2*len(text) + 2) :: buffer
+      integer :: i, n
+
+      buffer(1:1) = "'"
+      n = 1
+      do i = 1, len(text)
+         n = n + 1
+         buffer(n:n) = text(i:i)
+         if (text(i:i) /= "'") cycle
+         n = n + 1
+         buffer(n:n) = "'"
+      end do
+      string = buffer(:n)//"'"
+   end function quoted
+
+   !> Text that is safe on a terminal: control characters become '?', and no more than `limit` bytes.
+   pure function printable(text, limit) result(clean)
+      character(len=*), intent(in) :: text
+      integer, intent(in) :: limit !! longest result, not counting the dots that mark a cut
+      character(len=:), allocatable :: clean
+      integer :: i
+
+      clean = text(:min(len(text), limit))
+      do i = 1, len(clean)
+         if (iachar(clean(i:i)) < 32 .or. iachar(clean(i:i)) == 127) clean(i:i) = '?'
+      end do
+      if (len(text) <= limit) return
+      do i = limit, max(1, limit - 3), -1 ! never cut a UTF-8 sequence in two
+         if (iand(iachar(text(i + 1:i + 1)), 192) /= 128) exit
+         clean = clean(:i - 1)
+      end do
+      clean = clean//'...'
+   end function printable
+
+   !> Levenshtein distance: insertions, deletions and substitutions of one character.
+   pure integer function edit_distance(a, b) result(distance)
+      character(len=*), intent(in) :: a, b
+      integer :: row(0:len(b))
+      integer :: i, j, diagonal, above
+
+      row = [(j, j=0, len(b))]
+      do i = 1, len(a)
+         diagonal = row(0)
+         row(0) = i
+         do j = 1, len(b)
+            above = row(j)
+            row(j) = min(above + 1, row(j - 1) + 1, diagonal + merge(0, 1, a(i:i) == b(j:j)))
+            diagonal = above
+         end do
+      end do
+      distance = row(len(b))
+   end function edit_distance
+
+   !> How many words a list such as 'free|fixed' has.
+   pure integer function word_count(list)
+      character(len=*), intent(in) :: list
+      integer :: i
+      word_count = 0
+      if (len_trim(list) > 0) word_count = 1 + count([(list(i:i) == '|', i=1, len(list))])
+   end function word_count
+
+   !> Word `k` of a list such as 'free|fixed'.
+   pure function word(list, k) result(text)
+      character(len=*), intent(in) :: list
+      integer, intent(in) :: k
+      character(len=:), allocatable :: text
+      integer :: i, first, last
+
+      first = 1
+      do i = 2, k
+         first = first + index(list(first:), '|')
+      end do
+      last = index(list(first:), '|') + first - 2
+      if (last < first) last = len_trim(list)
+      text = list(first:last)
+   end function word
+
+end module rodyn_text

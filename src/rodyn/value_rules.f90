@@ -1,0 +1,82 @@
+!> Does one value of a namelist keep the rules of its row?
+module rodyn_value_rules
+   use rodyn_namelist_document, only: namelist_document, namelist_value, string_content, is_integer, &
+      is_long_integer, is_real, is_too_large, is_too_small, is_not_finite, is_logical, is_string
+   use rodyn_schema, only: schema_row, type_integer, type_logical, type_real, type_word, requirement, rule_text, &
+      satisfies
+   use rodyn_text, only: lower, word, word_count
+   implicit none (type, external)
+   private
+   public :: broken_rule, matching_word
+
+contains
+
+   !> The rule that a value breaks, in words; not allocated if it breaks none.
+   pure subroutine broken_rule(document, row, value, rule)
+      type(namelist_document), intent(in) :: document
+      type(schema_row), intent(in) :: row
+      type(namelist_value), intent(in) :: value
+      character(len=:), allocatable, intent(out) :: rule
+
+      select case (row%type)
+      case (type_integer, type_real)
+         call broken_number_rule(row, value, rule)
+      case (type_logical)
+         if (value%kind /= is_logical) rule = requirement(row)
+      case (type_word)
+         if (value%kind /= is_string) then
+            rule = requirement(row)//', in quotes'
+         else if (matching_word(row, string_content(document, value)) == 0) then
+            rule = requirement(row)
+         end if
+      case default
+         if (value%kind /= is_string) then
+            rule = requirement(row)
+         else if (value%last - value%first + 1 > nint(row%high)) then
+            if (len(string_content(document, value)) > nint(row%high)) rule = rule_text(row)
+         end if
+      end select
+   end subroutine broken_rule
+
+   pure subroutine broken_number_rule(row, value, rule)
+      type(schema_row), intent(in) :: row
+      type(namelist_value), intent(in) :: value
+      character(len=:), allocatable, intent(out) :: rule
+
+      select case (value%kind)
+      case (is_integer)
+         if (.not. satisfies(row, value%x)) rule = rule_text(row)
+      case (is_long_integer)
+         if (row%type == type_integer) then
+            rule = 'is beyond the largest whole number'
+         else if (.not. satisfies(row, value%x)) then
+            rule = rule_text(row)
+         end if
+      case (is_real)
+         if (row%type == type_integer) then
+            rule = requirement(row)
+         else if (.not. satisfies(row, value%x)) then
+            rule = rule_text(row)
+         end if
+      case (is_too_large)
+         rule = 'is beyond the largest number'
+      case (is_too_small)
+         rule = 'is smaller than the smallest number; write 0'
+      case (is_not_finite)
+         rule = 'must be finite'
+      case default
+         rule = requirement(row)
+      end select
+   end subroutine broken_number_rule
+
+   !> Which of the row's words a text is, case and trailing blanks aside; 0 if none.
+   pure integer function matching_word(row, text) result(found)
+      type(schema_row), intent(in) :: row
+      character(len=*), intent(in) :: text
+      do found = 1, word_count(row%words)
+         if (lower(word(row%words, found)) == lower(text)) return
+      end do
+      found = 0
+   end function matching_word
+
+end module rodyn_value_rules

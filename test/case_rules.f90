@@ -1,0 +1,202 @@
+!> Rules that tie several keys of a case together.
+module test_case_rules
+   use rodyn_errors, only: error_type
+   use test_case_support, only: expect_faults, nl, chain, valid
+   use test_testing, only: new_test, unittest
+   implicit none (type, external)
+   private
+   public :: collect_case_rules
+
+contains
+
+   subroutine collect_case_rules(suite)
+      type(unittest), allocatable, intent(out) :: suite(:)
+      suite = [ &
+         new_test('dynamic bending with lumped inertia is refused', dynamic_lumped), &
+         new_test('lumped inertia with the default bending is refused', default_lumped), &
+         new_test('quasistatic bending with distributed inertia is refused', quasistatic_distributed), &
+         new_test('bent rods at the start are refused unless bending is dynamic', bent_rigid), &
+         new_test('a fixed spacecraft does not move at the start', fixed_moves), &
+         new_test('a load on a node needs the node', node_missing), &
+         new_test('a load on a node that does not exist is refused', node_unknown), &
+         new_test('a node goes with loads on nodes only', node_forbidden), &
+         new_test('moments act on the spacecraft only', moment_on_node), &
+         new_test('a load must not begin after its end', load_reversed), &
+         new_test('each law asks for its keys', law_required), &
+         new_test('each law refuses the keys of others', law_forbidden), &
+         new_test('a table has as many values as times', table_count), &
+         new_test('the times of a table increase', table_order), &
+         new_test('a smooth step fits between start and end', rise_too_long), &
+         new_test('a fixed step goes with erk only', fixed_step_adams), &
+         new_test('no rule is applied to a key that is wrong itself', no_echo), &
+         new_test('a free spacecraft needs mass and inertia', free_needs_mass)]
+   end subroutine collect_case_rules
+
+   subroutine dynamic_lumped(error)
+      type(error_type), allocatable, intent(out) :: error
+      call expect_faults(error, &
+         valid//'&model inertia = ''lumped'','//nl//' bending = ''dynamic'' /', &
+         'c.nml:4: &model bending = ''dynamic'': bending = ''dynamic'' is not possible with '//&
+         'inertia = ''lumped''; take ''quasistatic'' or ''rigid''')
+   end subroutine dynamic_lumped
+
+   subroutine default_lumped(error)
+      type(error_type), allocatable, intent(out) :: error
+      call expect_faults(error, &
+         valid//'&model inertia = ''lumped'' /', &
+         'c.nml:3: &model inertia = ''lumped'': bending = ''dynamic'' is not possible with '//&
+         'inertia = ''lumped''; take ''quasistatic'' or ''rigid''')
+   end subroutine default_lumped
+
+   subroutine quasistatic_distributed(error)
+      type(error_type), allocatable, intent(out) :: error
+      call expect_faults(error, &
+         valid//'&model bending = ''quasistatic'' /', &
+         'c.nml:3: &model bending = ''quasistatic'': bending = ''quasistatic'' is not '//&
+         'possible with inertia = ''distributed''; take ''dynamic'' or ''rigid'', or inertia '//&
+         '= ''lumped''')
+   end subroutine quasistatic_distributed
+
+   subroutine bent_rigid(error)
+      type(error_type), allocatable, intent(out) :: error
+      call expect_faults(error, &
+         valid//'&model bending = ''rigid'' /'//nl//&
+         '&initial alpha(2) = 0.1, beta = 0, alpha_rate = 1, beta_rate = 4*1, phi_rate '//'= 1 /', &
+         'c.nml:4: &initial alpha(2) = 0.1: must be 0 when bending = ''rigid'''//nl//&
+         'c.nml:4: &initial alpha_rate = 1: must be 0 when bending = ''rigid'''//nl//&
+         'c.nml:4: &initial beta_rate = 4*1: must be 0 when bending = ''rigid''')
+   end subroutine bent_rigid
+
+   subroutine fixed_moves(error)
+      type(error_type), allocatable, intent(out) :: error
+      call expect_faults(error, &
+         chain//'&spacecraft motion = ''fixed'' /'//nl//&
+         '&initial velocity_x = 1, velocity_y = 1, omega = 1, displacement_x = 1, '//&
+         'displacement_y = 1, rotation = 1 /', &
+         'c.nml:3: &initial velocity_x = 1: must be 0 when motion = ''fixed'''//nl//&
+         'c.nml:3: &initial velocity_y = 1: must be 0 when motion = ''fixed'''//nl//&
+         'c.nml:3: &initial omega = 1: must be 0 when motion = ''fixed'''//nl//&
+         'c.nml:3: &initial displacement_x = 1: must be 0 when motion = ''fixed'''//nl//&
+         'c.nml:3: &initial displacement_y = 1: must be 0 when motion = ''fixed'''//nl//&
+         'c.nml:3: &initial rotation = 1: must be 0 when motion = ''fixed''')
+   end subroutine fixed_moves
+
+   subroutine node_missing(error)
+      type(error_type), allocatable, intent(out) :: error
+      call expect_faults(error, &
+         valid//'&load target = ''node'', component = ''X'', value = 1 /', &
+         'c.nml:3: &load node: is required when target = ''node''')
+   end subroutine node_missing
+
+   subroutine node_unknown(error)
+      type(error_type), allocatable, intent(out) :: error
+      call expect_faults(error, &
+         valid//'&load target = ''node'', component = ''X'', value = 1, node = 5 /'//nl//&
+         '&load target = ''node'', component = ''Y'', value = 1, node = 0 /', &
+         'c.nml:3: &load node = 5: there is no such node; they are numbered 1..4'//nl//&
+         'c.nml:4: &load node = 0: must be at least 1')
+   end subroutine node_unknown
+
+   subroutine node_forbidden(error)
+      type(error_type), allocatable, intent(out) :: error
+      call expect_faults(error, &
+         valid//'&load value = 1, node = 2 /', &
+         'c.nml:3: &load node = 2: goes with target = ''node'' only')
+   end subroutine node_forbidden
+
+   subroutine moment_on_node(error)
+      type(error_type), allocatable, intent(out) :: error
+      call expect_faults(error, &
+         valid//'&load target = ''node'', node = 1, component = ''M'', value = 1 /', &
+         'c.nml:3: &load component = ''M'': must be ''X'' or ''Y'' when target = ''node''; '//&
+         'moments act on the spacecraft only')
+   end subroutine moment_on_node
+
+   subroutine load_reversed(error)
+      type(error_type), allocatable, intent(out) :: error
+      call expect_faults(error, &
+         valid//'&load value = 1, t_start = 3, t_end = 2 /'//nl//'&load value = 1, t_start = 3 /'//nl//&
+         '&load value = 1, t_end = -1 /', &
+         'c.nml:3: &load t_start = 3: must not be after t_end = 2.00000 [s]'//nl//&
+         'c.nml:4: &load t_start = 3: must not be after t_end = 1.00000 [s]'//nl//&
+         'c.nml:5: &load t_end = -1: must not be before t_start = 0.00000 [s]')
+   end subroutine load_reversed
+
+   subroutine law_required(error)
+      type(error_type), allocatable, intent(out) :: error
+      call expect_faults(error, &
+         valid//'&load /'//nl//'&load law = ''sine_squared'' /'//nl//'&load law = ''table'' /'//nl//&
+         '&load law = ''smooth_step'' /', &
+         'c.nml:3: &load value: is required when law = ''constant'''//nl//&
+         'c.nml:4: &load value: is required when law = ''sine_squared'''//nl//&
+         'c.nml:4: &load rate: is required when law = ''sine_squared'''//nl//&
+         'c.nml:5: &load times: is required when law = ''table'''//nl//&
+         'c.nml:5: &load values: is required when law = ''table'''//nl//&
+         'c.nml:6: &load value: is required when law = ''smooth_step''')
+   end subroutine law_required
+
+   subroutine law_forbidden(error)
+      type(error_type), allocatable, intent(out) :: error
+      call expect_faults(error, &
+         valid//'&load value = 1, rate = 2 /'//nl//&
+         '&load law = ''table'', times = 0, 1, values = 1, 2, value = 3, rise_time = 1 /', &
+         'c.nml:3: &load rate = 2: does not go with law = ''constant'''//nl//&
+         'c.nml:4: &load value = 3: does not go with law = ''table'''//nl//&
+         'c.nml:4: &load rise_time = 1: does not go with law = ''table''')
+   end subroutine law_forbidden
+
+   subroutine table_count(error)
+      type(error_type), allocatable, intent(out) :: error
+      call expect_faults(error, &
+         valid//'&load law = ''table'', times = 0, 1, 2, values = 1, 2 /'//nl//&
+         '&load law = ''table'', times = 0, values = 1 /', &
+         'c.nml:3: &load values = 1, 2: must be as many as times: 3, not 2'//nl//&
+         'c.nml:4: &load times = 0: must be two values at least')
+   end subroutine table_count
+
+   subroutine table_order(error)
+      type(error_type), allocatable, intent(out) :: error
+      call expect_faults(error, &
+         valid//'&load law = ''table'', times = 0, 2, 2, values = 3*1 /', &
+         'c.nml:3: &load times = 0, 2, 2: must increase, but value 3, 2.00000, follows '//&
+         '2.00000 [s]')
+   end subroutine table_order
+
+   subroutine rise_too_long(error)
+      type(error_type), allocatable, intent(out) :: error
+      call expect_faults(error, &
+         valid//'&load law = ''smooth_step'', value = 1, rise_time = 3 /'//nl//&
+         '&load law = ''smooth_step'', value = 1, rise_time = 0 /'//nl//&
+         '&load law = ''smooth_step'', value = 1, t_start = 1 /', &
+         'c.nml:3: &load rise_time = 3: must not exceed t_end - t_start = 1.00000 [s]'//nl//&
+         'c.nml:4: &load rise_time = 0: must be positive [s]'//nl//&
+         'c.nml:5: &load rise_time: must be positive, but t_end = t_start [s]')
+   end subroutine rise_too_long
+
+   subroutine fixed_step_adams(error)
+      type(error_type), allocatable, intent(out) :: error
+      call expect_faults(error, &
+         valid//'&solver method = ''adams'', fixed_step = 0.1 /'//nl, &
+         'c.nml:3: &solver fixed_step = 0.1: is possible with method = ''erk'' only')
+   end subroutine fixed_step_adams
+
+   subroutine no_echo(error)
+      type(error_type), allocatable, intent(out) :: error
+      call expect_faults(error, &
+         valid//'&load law = ''step'', rate = 1 /'//nl//&
+         '&model inertia = ''lumped'', bending = ''elastic'' /'//nl, &
+         'c.nml:3: &load law = ''step'': must be ''constant'', ''table'', ''sine_squared'' or '//&
+         '''smooth_step'''//nl//&
+         'c.nml:4: &model bending = ''elastic'': must be ''dynamic'', ''quasistatic'' or ''rigid''')
+   end subroutine no_echo
+
+   subroutine free_needs_mass(error)
+      type(error_type), allocatable, intent(out) :: error
+      call expect_faults(error, &
+         chain//'&spacecraft /'//nl, &
+         'c.nml:2: &spacecraft mass: is required when motion = ''free'''//nl//&
+         'c.nml:2: &spacecraft inertia: is required when motion = ''free''')
+   end subroutine free_needs_mass
+
+
+end module test_case_rules
