@@ -1,5 +1,9 @@
+!> The program `rodyn`: arguments in, exit code out; everything else is in the library.
 program main
-   use rodyn, only: wp
+   use rodyn_command_line, only: run_command
    implicit none (type, external)
-   print *, wp
+   integer :: exit_code
+
+   call run_command(exit_code)
+   stop exit_code, quiet=.true.
 end program main

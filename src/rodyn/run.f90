@@ -77,9 +77,14 @@ contains
       call new_integrator(integrator, motion, choice%method, options_of(config), error)
       if (allocated(error)) return
 
-      header = run_header(title=config%title, input='', resolved_input=resolved_case(config), &
-                          sundials_version=sundials_version(), n_rods=scene%n, n_rows=config%n_outputs + 1, &
-                          ledger=config%output%ledger, compression=config%output%compression)
+      header%title = config%title
+      header%input = ''
+      header%resolved_input = resolved_case(config)
+      header%sundials_version = sundials_version()
+      header%n_rods = scene%n
+      header%n_rows = config%n_outputs + 1
+      header%ledger = config%output%ledger
+      header%compression = config%output%compression
       if (present(input_text)) header%input = input_text
       call recorder%file%create(path, header, replace, error)
       if (allocated(error)) return
@@ -146,14 +151,22 @@ contains
       type(solver_report) :: report
 
       stats = integrator%statistics()
-      report = solver_report(method=choice%method, reason=choice%reason, &
-                             kernel=trim(merge('assembled', 'recursive', scene%assembled)), &
-                             order=config%solver%order, rtol=config%solver%rtol, atol=config%solver%atol, &
-                             max_step=config%solver%max_step, fixed_step=config%solver%fixed_step, &
-                             last_step=stats%last_step, n_steps=stats%n_steps, n_rhs=stats%n_rhs, n_jac=stats%n_jac, &
-                             n_nonlinear_failures=stats%n_nonlinear_failures, &
-                             n_error_test_failures=stats%n_error_test_failures, &
-                             n_restarts=max(0_i8, stats%n_starts - 1_i8), wall_seconds=seconds)
+      report%method = choice%method
+      report%reason = choice%reason
+      report%kernel = trim(merge('assembled', 'recursive', scene%assembled))
+      report%order = config%solver%order
+      report%rtol = config%solver%rtol
+      report%atol = config%solver%atol
+      report%max_step = config%solver%max_step
+      report%fixed_step = config%solver%fixed_step
+      report%last_step = stats%last_step
+      report%n_steps = stats%n_steps
+      report%n_rhs = stats%n_rhs
+      report%n_jac = stats%n_jac
+      report%n_nonlinear_failures = stats%n_nonlinear_failures
+      report%n_error_test_failures = stats%n_error_test_failures
+      report%n_restarts = max(0_i8, stats%n_starts - 1_i8)
+      report%wall_seconds = seconds
       if (.not. allocated(failure)) then
          call file%finish('done', report, error)
       else if (failure%exit_code == exit_stopped) then
