@@ -1,0 +1,79 @@
+!> Whole integrations for tests: a case in, the states at some times out.
+module test_trajectories
+   use rodyn_kinds, only: wp
+   use rodyn_errors, only: error_type
+   use rodyn_case_config, only: case_config
+   use rodyn_scene, only: scene_type, new_scene
+   use rodyn_motion, only: motion_type, new_motion, initial_state
+   use rodyn_kinematics, only: invariants_type, invariants
+   use rodyn_ledger, only: fill_row
+   use rodyn_run_file, only: run_row, new_run_row
+   use rodyn_integrator, only: integrator_type, solver_options
+   use rodyn_integrators, only: new_integrator
+   use rodyn_simulation, only: observer_type, simulate
+   implicit none (type, external)
+   private
+   public :: trajectory, integrate
+
+   !> Keeps every row.
+   type, extends(observer_type) :: trajectory
+      type(run_row), allocatable :: rows(:)
+      integer :: n_rows = 0
+      real(wp) :: initial_energy = 0.0_wp
+   contains
+      procedure :: observe
+   end type trajectory
+
+contains
+
+   !> Integrate a case by its method ('auto' is Adams here) and keep the states at `times`.
+   subroutine integrate(config, times, result, error)
+      type(case_config), intent(in) :: config
+      real(wp), intent(in) :: times(:)          !! increasing; the last one is the end [s]
+      type(trajectory), intent(out) :: result
+      type(error_type), allocatable, intent(out) :: error
+      type(scene_type) :: scene
+      type(motion_type), target :: motion
+      class(integrator_type), allocatable :: integrator
+      type(solver_options) :: options
+      real(wp), allocatable :: y(:)
+      real(wp) :: t
+      integer :: i
+
+      call new_scene(scene, config, error)
+      if (.not. allocated(error)) call new_motion(motion, scene, config%output%ledger, error)
+      if (allocated(error)) return
+      call initial_state(motion, config%initial, y)
+      options%rtol = config%solver%rtol
+      options%atol = config%solver%atol
+      options%order = config%solver%order
+      options%fixed_step = config%solver%fixed_step
+      call new_integrator(integrator, motion, trim(merge('adams', config%solver%method(:5), &
+                                                         config%solver%method == 'auto')), options, error)
+      if (allocated(error)) return
+      allocate (result%rows(size(times)))
+      do i = 1, size(times)
+         result%rows(i) = new_run_row(scene%n)
+      end do
+      call simulate(motion, integrator, times, times(size(times)), result, y, t, error)
+      call integrator%finalize()
+   end subroutine integrate
+
+   subroutine observe(self, motion, t, y, error)
+      class(trajectory), intent(inout) :: self
+      type(motion_type), intent(in) :: motion
+      real(wp), intent(in) :: t
+      real(wp), intent(in) :: y(:)
+      type(error_type), allocatable, intent(out) :: error
+      type(invariants_type) :: start
+
+      if (self%n_rows == 0) then
+         start = invariants(motion%dynamics%scene, y(:motion%n_dof), y(motion%n_dof + 1:2*motion%n_dof))
+         self%initial_energy = start%kinetic + start%elastic
+      end if
+      self%n_rows = self%n_rows + 1
+      call fill_row(motion, t, y, self%initial_energy, self%rows(self%n_rows))
+      if (allocated(error)) return
+   end subroutine observe
+
+end module test_trajectories
