@@ -779,6 +779,7 @@ contains
       open (newunit=unit, file='/proc/self/statm', action='read', status='old', iostat=status)
       if (status /= 0) return
       read (unit, *, iostat=status) total, pages
+      if (status /= 0) pages = 0
       close (unit)
    end function resident_pages
 
