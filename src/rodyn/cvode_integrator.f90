@@ -281,10 +281,12 @@ contains
       stats%n_starts = self%n_starts
       if (.not. self%initialized) return
       stats%n_rhs = self%data%n_rhs
-      if (FCVodeGetNumErrTestFails(self%memory, count) == CV_SUCCESS) &
+      if (FCVodeGetNumErrTestFails(self%memory, count) == CV_SUCCESS) then
          stats%n_error_test_failures = stats%n_error_test_failures + count(1)
-      if (FCVodeGetNumNonlinSolvConvFails(self%memory, count) == CV_SUCCESS) &
+      end if
+      if (FCVodeGetNumNonlinSolvConvFails(self%memory, count) == CV_SUCCESS) then
          stats%n_nonlinear_failures = stats%n_nonlinear_failures + count(1)
+      end if
       if (FCVodeGetLastOrder(self%memory, order) == CV_SUCCESS) then
          if (order(1) > 0) stats%last_order = order(1)
       end if

@@ -6,7 +6,8 @@
 !>
 !> The tables are SUNDIALS' own: Heun-Euler 2(1), Bogacki-Shampine 3(2), Zonneveld 4(3), Cash-Karp 5(4), Verner 6(5),
 !> Fehlberg 8(7); order 7 is Fehlberg's pair with its two solutions exchanged. Fehlberg's error estimate is blind to
-!> pure quadratures, y' = f(t).
+!> pure quadratures, y' = f(t). A right-hand side that cannot be evaluated ends an ERKStep run at once, without
+!> trying a shorter step.
 module rodyn_erk_integrator
    use, intrinsic :: iso_c_binding, only: c_ptr, c_int, c_long, c_double, c_null_ptr, c_associated, c_loc, c_funloc, c_f_pointer
    use rodyn_kinds, only: wp, i8
@@ -23,7 +24,8 @@ module rodyn_erk_integrator
       ARKODE_FEHLBERG_13_7_8, FARKodeButcherTable_LoadERK, FARKodeButcherTable_Free
    use farkode_erkstep_mod, only: FERKStepCreate, FERKStepReInit, FERKStepFree, FERKStepEvolve, FERKStepSetTable, &
       FERKStepSetUserData, FERKStepWFtolerances, FERKStepSetErrHandlerFn, FERKStepSetMaxStep, FERKStepSetStopTime, &
-      FERKStepSetFixedStep, FERKStepSetInterpolantDegree, FERKStepGetNumErrTestFails, FERKStepGetLastStep
+      FERKStepSetFixedStep, FERKStepSetInterpolantDegree, FERKStepGetNumErrTestFails, FERKStepGetLastStep, &
+      FERKStepSetPostprocessStepFn
    implicit none (type, external)
    private
    public :: erk_integrator, new_erk_integrator
@@ -147,7 +149,12 @@ contains
       call check(error, FERKStepSetInterpolantDegree(self%memory, interpolant_degree), 'ERKStepSetInterpolantDegree')
       if (allocated(error)) return
       call choose_table(self, error)
-      if (allocated(error) .or. .not. self%options%max_step > 0.0_wp) return
+      if (allocated(error)) return
+      if (.not. first_same_as_last(self)) then
+         call check(error, FERKStepSetPostprocessStepFn(self%memory, c_funloc(nothing_to_do)), 'ERKStepSetPostprocessStepFn')
+         if (allocated(error)) return
+      end if
+      if (.not. self%options%max_step > 0.0_wp) return
       call check(error, FERKStepSetMaxStep(self%memory, self%options%max_step), 'ERKStepSetMaxStep')
    end subroutine initialize
 
@@ -183,6 +190,27 @@ contains
       call check(error, FERKStepSetTable(self%memory, address), 'ERKStepSetTable')
       call FARKodeButcherTable_Free(address)
    end subroutine choose_table
+
+   !> True if the last stage is the new state, so that its rate may begin the next step.
+   !>
+   !> SUNDIALS before 6.7 takes this for granted as soon as c_s = 1. For Verner's and Fehlberg's tables that is wrong
+   !> and costs the order: 3 is observed instead of 6. A postprocessing function, even one that does nothing,
+   !> makes ERKStep evaluate the rate at the new state.
+   pure function first_same_as_last(self) result(same)
+      class(erk_integrator), intent(in) :: self
+      logical :: same
+      same = all(abs(self%a(:, size(self%b)) - self%b) <= epsilon(1.0_wp))
+   end function first_same_as_last
+
+   !> ARKPostProcessFn that leaves the state alone.
+   function nothing_to_do(t, y, user_data) result(flag) bind(c)
+      real(c_double), intent(in), value :: t
+      type(N_Vector), intent(in) :: y
+      type(c_ptr), intent(in), value :: user_data
+      integer(c_int) :: flag
+      associate (u1 => t, u2 => y, u3 => user_data); end associate
+      flag = 0_c_int
+   end function nothing_to_do
 
    !> The coefficients as arrays.
    subroutine copy_table(self, table)
@@ -351,8 +379,9 @@ contains
       stats%last_order = self%order
       if (.not. c_associated(self%memory)) return
       stats%n_rhs = self%data%n_rhs
-      if (FERKStepGetNumErrTestFails(self%memory, count) == ARK_SUCCESS) &
+      if (FERKStepGetNumErrTestFails(self%memory, count) == ARK_SUCCESS) then
          stats%n_error_test_failures = stats%n_error_test_failures + count(1)
+      end if
       if (FERKStepGetLastStep(self%memory, step) == ARK_SUCCESS) then
          if (abs(step(1)) > 0.0_wp) stats%last_step = step(1)
       end if
