@@ -1,6 +1,8 @@
 !> The test program: `tester [filter]` runs every test whose name contains the filter.
 program tester
    use test_testing, only: run_suite, suite_tally, unittest
+   use test_quadrature, only: collect_quadrature
+   use test_article, only: collect_article
    use test_hdf5_files, only: collect_hdf5_files
    use test_kernels, only: collect_kernels
    use test_motion, only: collect_motion
@@ -21,6 +23,8 @@ program tester
    filter = ''
    if (command_argument_count() > 0) call get_command_argument(1, filter)
 
+   call collect_quadrature(suite)
+   call run_suite('quadrature', suite, tally, trim(filter))
    call collect_kernels(suite)
    call run_suite('kernels', suite, tally, trim(filter))
    call collect_motion(suite)
@@ -45,6 +49,8 @@ program tester
    call run_suite('case_rules', suite, tally, trim(filter))
    call collect_case_reader(suite)
    call run_suite('case_reader', suite, tally, trim(filter))
+   call collect_article(suite)
+   call run_suite('article', suite, tally, trim(filter))
 
    write (*, '(i0, " passed, ", i0, " failed")') tally%passed, tally%failed
    if (tally%failed > 0 .or. tally%passed == 0) stop 1, quiet=.true.

@@ -85,8 +85,8 @@ contains
    subroutine oscillator_rhs(self, t, y, ydot, ok)
       class(oscillator), intent(inout) :: self
       real(wp), intent(in) :: t
-      real(wp), intent(in) :: y(:)
-      real(wp), intent(out) :: ydot(:)
+      real(wp), contiguous, intent(in) :: y(:)
+      real(wp), contiguous, intent(out) :: ydot(:)
       logical, intent(out) :: ok
       self%n_calls = self%n_calls + 1
       self%t_largest = max(self%t_largest, t)
@@ -100,8 +100,8 @@ contains
    subroutine oscillator_jacobian(self, t, y, jac, ok)
       class(oscillator), intent(inout) :: self
       real(wp), intent(in) :: t
-      real(wp), intent(in) :: y(:)
-      real(wp), intent(out) :: jac(:, :)
+      real(wp), contiguous, intent(in) :: y(:)
+      real(wp), contiguous, intent(out) :: jac(:, :)
       logical, intent(out) :: ok
       ok = t < huge(t)
       jac = 0.0_wp
@@ -113,8 +113,8 @@ contains
    subroutine robertson_rhs(self, t, y, ydot, ok)
       class(robertson), intent(inout) :: self
       real(wp), intent(in) :: t
-      real(wp), intent(in) :: y(:)
-      real(wp), intent(out) :: ydot(:)
+      real(wp), contiguous, intent(in) :: y(:)
+      real(wp), contiguous, intent(out) :: ydot(:)
       logical, intent(out) :: ok
       ok = self%n_states == 3 .and. t < huge(t)
       ydot(1) = -0.04_wp*y(1) + 1.0e4_wp*y(2)*y(3)
@@ -125,8 +125,8 @@ contains
    subroutine robertson_jacobian(self, t, y, jac, ok)
       class(robertson), intent(inout) :: self
       real(wp), intent(in) :: t
-      real(wp), intent(in) :: y(:)
-      real(wp), intent(out) :: jac(:, :)
+      real(wp), contiguous, intent(in) :: y(:)
+      real(wp), contiguous, intent(out) :: jac(:, :)
       logical, intent(out) :: ok
       ok = self%n_states == 3 .and. t < huge(t)
       jac(1, :) = [-0.04_wp, 1.0e4_wp*y(3), 1.0e4_wp*y(2)]
@@ -137,8 +137,8 @@ contains
    subroutine explosion_rhs(self, t, y, ydot, ok)
       class(explosion), intent(inout) :: self
       real(wp), intent(in) :: t
-      real(wp), intent(in) :: y(:)
-      real(wp), intent(out) :: ydot(:)
+      real(wp), contiguous, intent(in) :: y(:)
+      real(wp), contiguous, intent(out) :: ydot(:)
       logical, intent(out) :: ok
       ok = self%n_states == 1 .and. t < huge(t) .and. abs(y(1)) < 1.0e100_wp
       ydot = 0.0_wp
@@ -148,8 +148,8 @@ contains
    subroutine explosion_jacobian(self, t, y, jac, ok)
       class(explosion), intent(inout) :: self
       real(wp), intent(in) :: t
-      real(wp), intent(in) :: y(:)
-      real(wp), intent(out) :: jac(:, :)
+      real(wp), contiguous, intent(in) :: y(:)
+      real(wp), contiguous, intent(out) :: jac(:, :)
       logical, intent(out) :: ok
       ok = self%n_states == 1 .and. t < huge(t) .and. abs(y(1)) < 1.0e100_wp
       jac = 2.0_wp*y(1)
@@ -185,7 +185,7 @@ contains
       type(solver_options), intent(in) :: options
       real(wp), intent(in) :: t_end !! [s]
       integer, intent(in) :: n_outputs
-      real(wp), intent(inout) :: y(:)
+      real(wp), contiguous, intent(inout) :: y(:)
       type(solver_statistics), intent(out) :: stats
       type(error_type), allocatable, intent(out) :: error
 

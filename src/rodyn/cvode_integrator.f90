@@ -194,7 +194,7 @@ contains
    subroutine advance(self, t_out, y, t, error)
       class(cvode_integrator), intent(inout) :: self
       real(wp), intent(in) :: t_out !! [s]
-      real(wp), intent(out) :: y(:) !! (n_states)
+      real(wp), contiguous, intent(out) :: y(:) !! (n_states)
       real(wp), intent(out) :: t    !! [s]
       type(error_type), allocatable, intent(out) :: error
 
@@ -334,7 +334,7 @@ contains
 
       type(callback_data), pointer :: data
       type(vector_content), pointer :: states
-      real(c_double), pointer :: values(:, :)
+      real(c_double), pointer, contiguous :: values(:, :)
       logical :: ok
 
       associate (unused => rates, u1 => work1, u2 => work2, u3 => work3); end associate

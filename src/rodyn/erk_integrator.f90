@@ -239,7 +239,7 @@ contains
    subroutine advance(self, t_out, y, t, error)
       class(erk_integrator), intent(inout) :: self
       real(wp), intent(in) :: t_out !! [s]
-      real(wp), intent(out) :: y(:) !! (n_states)
+      real(wp), contiguous, intent(out) :: y(:) !! (n_states)
       real(wp), intent(out) :: t    !! [s]
       type(error_type), allocatable, intent(out) :: error
 
@@ -338,7 +338,7 @@ contains
    subroutine output_step(self, t_out, y, error)
       class(erk_integrator), intent(inout) :: self
       real(wp), intent(in) :: t_out !! within the last internal step [s]
-      real(wp), intent(out) :: y(:) !! (n_states)
+      real(wp), contiguous, intent(out) :: y(:) !! (n_states)
       type(error_type), allocatable, intent(out) :: error
 
       real(wp) :: h

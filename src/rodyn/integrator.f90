@@ -100,7 +100,7 @@ module rodyn_integrator
          implicit none (type, external)
          class(integrator_type), intent(inout) :: self
          real(wp), intent(in) :: t_out !! not before the previous one, not after the stop time [s]
-         real(wp), intent(out) :: y(:) !! (n_states)
+         real(wp), contiguous, intent(out) :: y(:) !! (n_states)
          real(wp), intent(out) :: t    !! t_out, or the last good time [s]
          type(error_type), allocatable, intent(out) :: error
       end subroutine advance_interface

@@ -11,7 +11,9 @@ module rodyn_quadrature
       real(wp), allocatable :: weights(:) !! positive, sum 1 (n)
    end type gauss_rule
 
-   real(wp), parameter :: pi = acos(-1.0_wp)
+   !> The roots crowd at the ends, where the weights lose digits like n^2: they are computed with more of them.
+   integer, parameter :: ep = selected_real_kind(18)
+   real(ep), parameter :: pi = acos(-1.0_ep)
 
 contains
 
@@ -20,14 +22,14 @@ contains
    pure subroutine new_gauss_rule(rule, n_points)
       type(gauss_rule), intent(out) :: rule
       integer, intent(in) :: n_points !! >= 1
-      real(wp) :: x, step, value, slope
+      real(ep) :: x, step, value, slope
       integer :: i, n
 
       n = n_points
       allocate (rule%points(n), rule%weights(n))
       do i = 1, (n + 1)/2
-         x = cos(pi*(i - 0.25_wp)/(n + 0.5_wp))
-         if (2*i == n + 1) x = 0.0_wp
+         x = cos(pi*(i - 0.25_ep)/(n + 0.5_ep))
+         if (2*i == n + 1) x = 0.0_ep
          do ! quadratic convergence: the step after one below sqrt(epsilon) is at rounding level
             call legendre(n, x, value, slope)
             step = value/slope
@@ -35,9 +37,9 @@ contains
             if (abs(step) < sqrt(epsilon(x))) exit
          end do
          call legendre(n, x, value, slope)
-         rule%points(i) = 0.5_wp*(1.0_wp - x)
-         rule%points(n + 1 - i) = 0.5_wp*(1.0_wp + x)
-         rule%weights(i) = 1.0_wp/((1.0_wp - x*x)*slope**2)
+         rule%points(i) = real(0.5_ep*(1.0_ep - x), wp)
+         rule%points(n + 1 - i) = real(0.5_ep*(1.0_ep + x), wp)
+         rule%weights(i) = real(1.0_ep/((1.0_ep - x*x)*slope**2), wp)
          rule%weights(n + 1 - i) = rule%weights(i)
       end do
    end subroutine new_gauss_rule
@@ -45,19 +47,19 @@ contains
    !> P_n(x) and P_n'(x) by the three-term recurrence, |x| < 1.
    pure subroutine legendre(n, x, value, slope)
       integer, intent(in) :: n
-      real(wp), intent(in) :: x
-      real(wp), intent(out) :: value, slope
-      real(wp) :: before, older
+      real(ep), intent(in) :: x
+      real(ep), intent(out) :: value, slope
+      real(ep) :: before, older
       integer :: j
 
-      value = 1.0_wp
-      before = 0.0_wp
+      value = 1.0_ep
+      before = 0.0_ep
       do j = 1, n
          older = before
          before = value
          value = ((2*j - 1)*x*before - (j - 1)*older)/j
       end do
-      slope = n*(before - x*value)/(1.0_wp - x*x)
+      slope = n*(before - x*value)/(1.0_ep - x*x)
    end subroutine legendre
 
 end module rodyn_quadrature

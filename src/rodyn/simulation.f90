@@ -36,7 +36,7 @@ contains
       real(wp), intent(in) :: times(:)                    !! increasing, within [0, t_end] [s]
       real(wp), intent(in) :: t_end                       !! [s]
       class(observer_type), intent(inout) :: observer
-      real(wp), intent(inout) :: y(:)                     !! in: state at t = 0; out: the last one
+      real(wp), contiguous, intent(inout) :: y(:)         !! in: state at t = 0; out: the last one
       real(wp), intent(out) :: t                          !! time of y [s]
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: ends(:)

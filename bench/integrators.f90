@@ -1,5 +1,5 @@
 !> What the integrators cost beside the right-hand side, for 26 states: 13 oscillators of 1 to 13 rad/s.
-module bench_oscillators
+module rodyn_bench_oscillators
    use rodyn_kinds, only: wp
    use rodyn_ode, only: ode_system
    implicit none (type, external)
@@ -17,8 +17,8 @@ contains
    subroutine oscillators_rhs(self, t, y, ydot, ok)
       class(oscillators), intent(inout) :: self
       real(wp), intent(in) :: t
-      real(wp), intent(in) :: y(:)
-      real(wp), intent(out) :: ydot(:)
+      real(wp), contiguous, intent(in) :: y(:)
+      real(wp), contiguous, intent(out) :: ydot(:)
       logical, intent(out) :: ok
       integer :: k
       ok = t < huge(t)
@@ -31,8 +31,8 @@ contains
    subroutine oscillators_jacobian(self, t, y, jac, ok)
       class(oscillators), intent(inout) :: self
       real(wp), intent(in) :: t
-      real(wp), intent(in) :: y(:)
-      real(wp), intent(out) :: jac(:, :)
+      real(wp), contiguous, intent(in) :: y(:)
+      real(wp), contiguous, intent(out) :: jac(:, :)
       logical, intent(out) :: ok
       integer :: k
       ok = t < huge(t) .and. size(y) == self%n_states
@@ -43,7 +43,7 @@ contains
       end do
    end subroutine oscillators_jacobian
 
-end module bench_oscillators
+end module rodyn_bench_oscillators
 
 !> Prints one line for the shim and one for each method.
 program bench_integrators
@@ -51,7 +51,7 @@ program bench_integrators
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type
    use rodyn_ode, only: ode_system
-   use bench_oscillators, only: oscillators
+   use rodyn_bench_oscillators, only: oscillators
    use rodyn_nvector, only: new_nvector, free_nvector
    use rodyn_sundials_base, only: callback_data, rhs_shim
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics
