@@ -6,6 +6,7 @@ program tester
    use test_case_keys, only: collect_case_keys
    use test_case_rules, only: collect_case_rules
    use test_case_reader, only: collect_case_reader
+   use test_schema, only: collect_schema
    use test_testing, only: run_suite, suite_tally, unittest
    implicit none (type, external)
    type(suite_tally) :: tally
@@ -21,6 +22,8 @@ program tester
    call run_suite('namelist_faults', suite, tally, trim(filter))
    call collect_namelist_fuzz(suite)
    call run_suite('namelist_fuzz', suite, tally, trim(filter))
+   call collect_schema(suite)
+   call run_suite('schema', suite, tally, trim(filter))
    call collect_case_keys(suite)
    call run_suite('case_keys', suite, tally, trim(filter))
    call collect_case_rules(suite)

@@ -86,7 +86,8 @@ contains
          call move_alloc(larger, document%groups)
       end if
       document%n_groups = document%n_groups + 1
-      document%groups(document%n_groups) = namelist_group(lower(name), line, document%n_entries + 1, document%n_entries)
+      document%groups(document%n_groups) = namelist_group(lower(name), line, first=document%n_entries + 1, &
+         last=document%n_entries)
    end subroutine add_group
 
    !> Append an entry, without values, to the last group.
