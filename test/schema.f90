@@ -81,7 +81,8 @@ contains
       type(error_type), allocatable :: refusal
       type(namelist_document), target :: document
       type(checked_document) :: checked
-      call checked_text('&axis key = ''a'', values(1) = 2 /'//nl//'&axis'//nl//'count = 1 /', document, checked, refusal)
+      call checked_text('&axis key = ''a'', values(1) = 2 /'//nl//'&axis'//nl//'count = 1 /', document, &
+         checked, refusal)
       call check(error, refusal%message, 's.nml:1: &axis values(1) = 2: takes no index'//nl// &
          's.nml:2: &axis key: is required'//nl//'s.nml:3: &axis count = 1: must be at least 2'//nl// &
          's.nml:3: &sweep base: is required', 'message')

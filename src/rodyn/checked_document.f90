@@ -58,11 +58,12 @@ contains
    !> k-th group of a name is found at once.
    subroutine sort_groups(checked)
       type(checked_document), intent(inout) :: checked
-      integer :: kind(checked%document%n_groups)
+      integer, allocatable :: kind(:)
       integer :: next(size(checked%groups) + 1)
       integer :: g, k, n
 
       n = size(checked%groups)
+      allocate (kind(checked%document%n_groups))
       do g = 1, size(kind)
          kind(g) = group_index(checked%groups, checked%document%groups(g)%name)
          if (kind(g) == 0) kind(g) = n + 1

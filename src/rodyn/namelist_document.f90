@@ -163,10 +163,11 @@ contains
       type(namelist_document), intent(in) :: document
       type(namelist_value), intent(in) :: value
       character(len=:), allocatable :: text
-      character(len=value%last - value%first + 1) :: buffer
+      character(len=:), allocatable :: buffer ! not automatic: a text may be larger than the stack
       character(len=1) :: quote
       integer :: i, n
 
+      allocate (character(len=value%last - value%first + 1) :: buffer)
       quote = document%text(value%first - 1:value%first - 1)
       n = 0
       i = value%first
