@@ -293,7 +293,8 @@ contains
       type(case_config) :: config
       call parse_document(valid//'&load value = 1 / &load value = 2 /', 'c.nml', document)
       call set_value(document, 'load.value', '3', refusal)
-      call check(error, refusal%message, 'load.value: the group stands 2 times; say which, as in load(1).value', 'refusal')
+      call check(error, refusal%message, 'load.value: the group stands 2 times; say which, as in load(1).value', &
+         'refusal')
       if (allocated(error)) return
       call set_value(document, 'load(2).value', '3', error)
       if (allocated(error)) return

@@ -30,6 +30,7 @@ contains
          new_test('numbers are read to the last bit', numbers), &
          new_test('the largest number is accepted and the next refused', largest), &
          new_test('a hundred thousand values are read', many_values), &
+         new_test('a text of twenty million bytes is survived', huge_text), &
          new_test('the edit distance counts single changes', distances)]
    end subroutine collect_namelist
 
@@ -182,6 +183,14 @@ contains
       if (allocated(error)) return
       call check(error, document%values(101000)%kind, is_string, 'kind of the last value')
    end subroutine many_values
+
+   subroutine huge_text(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(namelist_document) :: document
+      call parse('&a t = "'//repeat('a""', 7000000)//'" /', document, error)
+      if (allocated(error)) return
+      call check(error, len(string_content(document, document%values(1))), 14000000, 'length')
+   end subroutine huge_text
 
    subroutine distances(error)
       type(error_type), allocatable, intent(out) :: error

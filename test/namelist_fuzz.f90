@@ -16,8 +16,8 @@ module test_namelist_fuzz
       "&load law = 'table', times = 0 0.1 0.7, values = 3*0.2, component = 'X' /"//nl// &
       "&load law = ""sine_squared"", value = -1500, rate = 0.3, t_start = .05 /"//nl// &
       "&solver method = 'erk', fixed_step = 1.1e-3, order = 5 /"//nl//'&output ledger = .false. /'//nl
-   character(len=12), parameter :: pieces(20) = [character(len=12) :: 'nan', 'inf', '1e999', "'", '"', '/', '&', '=', &
-      ',', '(', ')', '!', '*', '999999999*1', ' -', 'e', '1:2', ';', '&load', '/ &']
+   character(len=12), parameter :: pieces(20) = [character(len=12) :: 'nan', 'inf', '1e999', "'", '"', '/', '&', &
+      '=', ',', '(', ')', '!', '*', '999999999*1', ' -', 'e', '1:2', ';', '&load', '/ &']
 
 contains
 
@@ -83,7 +83,7 @@ contains
          text = text(:last)//text(at:)
       case (4)
          text = text(at:)//text(:at - 1)
-      case (5)
+      case default
          text = text(:at - 1)//trim(pieces(1 + random(seed, size(pieces))))//text(last + 1:)
       end select
    end subroutine damage

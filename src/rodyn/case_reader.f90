@@ -1,7 +1,8 @@
 !> From a case file to a `case_config`: strict, and with every fault of the file in one error.
 !>
 !>     call read_case('table1.nml', config, text, error)
-!>     if (allocated(error)) print '(a)', error%message   ! table1.nml:12: &chain length(3) = -1.5: must be positive [m]
+!>     if (allocated(error)) print '(a)', error%message
+!>     ! table1.nml:12: &chain length(3) = -1.5: must be positive [m]
 !>
 !> For many variants of one file, parse it once, set keys, and build each case from the document:
 !>
@@ -10,14 +11,15 @@
 !>     call case_from_document(document, config, error)
 module rodyn_case_reader
    use rodyn_case_config, only: case_config
-   use rodyn_case_loader, only: case_loader
    use rodyn_case_rules, only: check_case
    use rodyn_case_schema, only: case_extents, case_groups, case_rows
-   use rodyn_case_visitor, only: visit_case
+   use rodyn_case_fields, only: visit_case
    use rodyn_case_writer, only: resolved_case
-   use rodyn_checked_document, only: checked_document, check_document, entry_of, instances, match_document
+   use rodyn_checked_document, only: checked_document, entry_of, instances, match_document
    use rodyn_defaults_text, only: defaults_text
+   use rodyn_document_checks, only: check_document
    use rodyn_errors, only: error_type
+   use rodyn_field_loader, only: field_loader
    use rodyn_file_text, only: read_text_file
    use rodyn_namelist_document, only: namelist_document, is_integer
    use rodyn_namelist_edit, only: set_value
@@ -68,7 +70,7 @@ contains
       type(case_config), intent(out) :: config
       type(error_type), allocatable, intent(out) :: error
       type(checked_document), target :: checked
-      type(case_loader) :: loader
+      type(field_loader) :: loader
 
       call match_document(document, case_groups, case_rows, checked)
       call check_document(checked, case_extents(rods_of(checked)))
@@ -104,8 +106,8 @@ contains
       do i = 1, size(config%loads)
          associate (load => config%loads(i))
             if (entry_of(checked, 'load', i, 't_end') == 0) load%t_end = config%t_end
-            if (load%law == 'smooth_step' .and. entry_of(checked, 'load', i, 'rise_time') == 0) &
-               load%rise_time = load%t_end - load%t_start
+            if (load%law /= 'smooth_step') cycle
+            if (entry_of(checked, 'load', i, 'rise_time') == 0) load%rise_time = load%t_end - load%t_start
          end associate
       end do
    end subroutine complete_loads

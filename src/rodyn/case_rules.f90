@@ -2,7 +2,7 @@
 module rodyn_case_rules
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: case_config, load_config
-   use rodyn_case_visitor, only: law_takes
+   use rodyn_case_fields, only: law_takes
    use rodyn_checked_document, only: checked_document, blame, entry_of, is_sound
    use rodyn_text, only: to_text
    implicit none (type, external)
@@ -43,7 +43,8 @@ contains
       type(checked_document), intent(inout) :: checked
       character(len=*), intent(in) :: group, key, reason
       integer, intent(in) :: instance
-      if (.not. given(checked, group, instance, key)) call blame(checked, group, instance, key, 'is required '//reason)
+      if (given(checked, group, instance, key)) return
+      call blame(checked, group, instance, key, 'is required '//reason)
    end subroutine require
 
    !> A free spacecraft has mass and inertia; a fixed one does not move.
@@ -87,8 +88,9 @@ contains
          call blame(checked, 'model', 1, key, "bending = 'dynamic' is not possible with inertia = 'lumped'; " &
             //"take 'quasistatic' or 'rigid'")
       else if (config%model%bending == 'quasistatic' .and. config%model%inertia == 'distributed') then
-         call blame(checked, 'model', 1, key, "bending = 'quasistatic' is not possible with inertia = 'distributed'; " &
-            //"take 'dynamic' or 'rigid', or inertia = 'lumped'")
+         call blame(checked, 'model', 1, key, &
+            "bending = 'quasistatic' is not possible with inertia = 'distributed'; "//&
+            "take 'dynamic' or 'rigid', or inertia = 'lumped'")
       end if
    end subroutine check_model
 
@@ -121,8 +123,8 @@ contains
       type(checked_document), intent(inout) :: checked
       type(case_config), intent(in) :: config
       if (.not. is_sound(checked, 'solver', 1, 'method')) return
-      if (config%solver%fixed_step > 0.0_wp .and. config%solver%method /= 'erk') &
-         call blame(checked, 'solver', 1, 'fixed_step', "is possible with method = 'erk' only")
+      if (config%solver%fixed_step <= 0.0_wp .or. config%solver%method == 'erk') return
+      call blame(checked, 'solver', 1, 'fixed_step', "is possible with method = 'erk' only")
    end subroutine check_solver
 
    !> A load on a node needs an existing node and is a force.
@@ -134,7 +136,8 @@ contains
 
       if (.not. is_sound(checked, 'load', i, 'target')) return
       if (load%target == 'spacecraft') then
-         if (given(checked, 'load', i, 'node')) call blame(checked, 'load', i, 'node', "goes with target = 'node' only")
+         if (.not. given(checked, 'load', i, 'node')) return
+         call blame(checked, 'load', i, 'node', "goes with target = 'node' only")
          return
       end if
       call require(checked, 'load', i, 'node', "when target = 'node'")
@@ -199,9 +202,10 @@ contains
 
       if (entry_of(checked, 'load', i, 'times') == 0) return
       if (size(load%times) < 2) call blame(checked, 'load', i, 'times', 'must be two values at least')
-      if (entry_of(checked, 'load', i, 'values') > 0 .and. size(load%values) /= size(load%times)) &
-         call blame(checked, 'load', i, 'values', 'must be as many as times: '//to_text(size(load%times))//', not ' &
-         //to_text(size(load%values)))
+      if (entry_of(checked, 'load', i, 'values') > 0 .and. size(load%values) /= size(load%times)) then
+         call blame(checked, 'load', i, 'values', 'must be as many as times: '//to_text(size(load%times)) &
+            //', not '//to_text(size(load%values)))
+      end if
       do k = 2, size(load%times)
          if (load%times(k) > load%times(k - 1)) cycle
          call blame(checked, 'load', i, 'times', 'must increase, but value '//to_text(k)//', '//short(load%times(k)) &

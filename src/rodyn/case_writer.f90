@@ -1,9 +1,10 @@
 !> Prints a case as a namelist with every key and the value used. Reading it back gives the same case.
 module rodyn_case_writer
    use rodyn_kinds, only: wp
-   use rodyn_case_config, only: case_config, load_config
+   use rodyn_case_config, only: case_config, name_length
    use rodyn_case_schema, only: case_rows
-   use rodyn_case_visitor, only: case_visitor, visit_case
+   use rodyn_case_fields, only: visit_case
+   use rodyn_field_visitor, only: field_visitor
    use rodyn_schema, only: row_index, satisfies
    use rodyn_text, only: quoted, to_text
    use rodyn_text_buffer, only: text_buffer
@@ -15,7 +16,7 @@ module rodyn_case_writer
 
    !> Prints what it visits. A number that breaks its own rule stands for a value that was not given, such as
    !> the mass of a fixed spacecraft, and is left out.
-   type, extends(case_visitor) :: case_writer
+   type, extends(field_visitor) :: case_writer
       type(text_buffer) :: text
       character(len=:), allocatable :: group
    contains
@@ -133,7 +134,7 @@ contains
    subroutine word_field(self, key, x)
       class(case_writer), intent(inout) :: self
       character(len=*), intent(in) :: key
-      character(len=*), intent(inout) :: x
+      character(len=name_length), intent(inout) :: x
       call put(self, key, quoted(trim(x)))
    end subroutine word_field
 

@@ -1,21 +1,17 @@
-!> A document held against a schema: which row each assignment belongs to, and whether it keeps that row's rules.
+!> A document held against a schema: which row of the table each assignment belongs to.
 !>
-!> Two steps, because how long the arrays are may itself stand in the file: `match_document` finds the rows,
-!> `check_document` then checks types, rules, counts, indices and what is missing. Rules that tie several keys
-!> together are the reader's; it reports with `blame`.
+!> Three steps, because how long the arrays are may itself stand in the file: `match_document` finds the rows, the
+!> reader looks up the extents, and `check_document` of `rodyn_document_checks` checks types, rules, counts, indices
+!> and what is missing. Rules that tie several keys together are the reader's; it reports them with `blame`.
 module rodyn_checked_document
-   use rodyn_kinds, only: i8
    use rodyn_faults, only: fault_list
-   use rodyn_namelist_document, only: namelist_document, namelist_entry, index_text, shown_value, shown_values
-   use rodyn_schema, only: schema_extent, schema_group, schema_row, any_list, group_index, nearest_group, &
-      nearest_key, one_value, row_index
-   use rodyn_text, only: is_digit, printable, to_text
-   use rodyn_value_rules, only: broken_rule
+   use rodyn_namelist_document, only: namelist_document, index_text, shown_values
+   use rodyn_schema, only: schema_extent, schema_group, schema_row, group_index, nearest_group, nearest_key, &
+      row_index
+   use rodyn_text, only: printable, to_text
    implicit none (type, external)
    private
-   public :: checked_document, match_document, check_document, blame, entry_of, is_sound, group_at, instances
-
-   integer, parameter :: max_list = 1000000 !! most values of a list of any length
+   public :: checked_document, match_document, blame, entry_of, is_sound, group_at, instances
 
    !> The document, the schema, and what came out. Lives no longer than the document.
    type :: checked_document
@@ -62,11 +58,12 @@ contains
    !> k-th group of a name is found at once.
    subroutine sort_groups(checked)
       type(checked_document), intent(inout) :: checked
-      integer :: kind(checked%document%n_groups)
+      integer, allocatable :: kind(:)
       integer :: next(size(checked%groups) + 1)
       integer :: g, k, n
 
       n = size(checked%groups)
+      allocate (kind(checked%document%n_groups))
       do g = 1, size(kind)
          kind(g) = group_index(checked%groups, checked%document%groups(g)%name)
          if (kind(g) == 0) kind(g) = n + 1
@@ -166,248 +163,6 @@ contains
             index_text(checked%document%entries(e))//': unknown key; '//hint)
       end associate
    end subroutine complain_of_key
-
-   !> Check every entry by its row, then each group as a whole.
-   subroutine check_document(checked, extents)
-      type(checked_document), intent(inout) :: checked
-      type(schema_extent), intent(in) :: extents(:) !! with count 0 where it is not known
-      integer :: e, g, k, r
-
-      checked%extents = extents
-      do g = 1, checked%document%n_groups
-         do e = checked%document%groups(g)%first, checked%document%groups(g)%last
-            if (checked%ok(e)) call check_entry(checked, g, e)
-         end do
-         call check_repeated(checked, g)
-      end do
-      do r = 1, size(checked%rows)
-         if (checked%rows(r)%default /= 'required') cycle
-         k = group_index(checked%groups, checked%rows(r)%group)
-         do g = 1, merge(instances(checked, trim(checked%rows(r)%group)), 1, checked%groups(k)%repeatable)
-            if (entry_of(checked, trim(checked%rows(r)%group), g, trim(checked%rows(r)%key), any_state=.true.) > 0) cycle
-            call blame(checked, trim(checked%rows(r)%group), g, trim(checked%rows(r)%key), 'is required')
-         end do
-      end do
-   end subroutine check_document
-
-   !> Values, then index and count.
-   subroutine check_entry(checked, g, e)
-      type(checked_document), intent(inout) :: checked
-      integer, intent(in) :: g, e
-      character(len=:), allocatable :: rule
-      integer(i8) :: element
-      integer :: v
-
-      associate (document => checked%document, entry => checked%document%entries(e), &
-                 row => checked%rows(checked%row(e)))
-         call check_count(checked, g, e)
-         element = 1
-         do v = entry%first, entry%last
-            call broken_rule(document, row, document%values(v), rule)
-            if (allocated(rule)) then
-               checked%ok(e) = .false.
-               call complain(checked, g, e, element_text(checked, e, element), shown_value(document, document%values(v)), &
-                  rule, document%values(v)%line)
-            end if
-            element = element + document%values(v)%copies
-         end do
-      end associate
-   end subroutine check_entry
-
-   !> '(3)' for the value of that place in a list; the entry's own index if there is one value or an index.
-   function element_text(checked, e, element) result(text)
-      type(checked_document), intent(in) :: checked
-      integer, intent(in) :: e
-      integer(i8), intent(in) :: element !! 1: the first value of the entry
-      character(len=:), allocatable :: text
-      integer :: first
-
-      associate (entry => checked%document%entries(e), extent => checked%rows(checked%row(e))%extent)
-         text = index_text(entry)
-         if (entry%first == entry%last .and. checked%document%values(entry%first)%copies == 1) return
-         if (extent == one_value .or. element > max_list) return
-         first = 1
-         if (extent > 0) first = checked%extents(extent)%lower
-         if (entry%indexed) first = entry%lower
-         text = '('//to_text(first + int(element) - 1)//')'
-      end associate
-   end function element_text
-
-   !> Note '&group key(index) = value: rule'.
-   subroutine complain(checked, g, e, where, value, rule, line)
-      type(checked_document), intent(inout) :: checked
-      integer, intent(in) :: g, e
-      character(len=*), intent(in) :: where !! index in parentheses, or nothing
-      character(len=*), intent(in) :: value !! as written
-      character(len=*), intent(in) :: rule
-      integer, intent(in) :: line
-      call checked%faults%add(line, '&'//trim(checked%document%groups(g)%name)//' ' &
-         //trim(checked%document%entries(e)%key)//where//' = '//value//': '//rule)
-   end subroutine complain
-
-   !> Note a fault of an entry as a whole, and drop the entry.
-   subroutine reject(checked, g, e, rule)
-      type(checked_document), intent(inout) :: checked
-      integer, intent(in) :: g, e
-      character(len=*), intent(in) :: rule
-
-      checked%ok(e) = .false.
-      associate (entry => checked%document%entries(e))
-         call complain(checked, g, e, index_text(entry), shown_values(checked%document, entry), rule, entry%line)
-      end associate
-   end subroutine reject
-
-   !> Does the number of values fit the row, and the index the extent?
-   subroutine check_count(checked, g, e)
-      type(checked_document), intent(inout) :: checked
-      integer, intent(in) :: g, e
-      integer(i8) :: given
-      integer :: extent
-
-      extent = checked%rows(checked%row(e))%extent
-      associate (entry => checked%document%entries(e), values => checked%document%values)
-         given = sum(int(values(entry%first:entry%last)%copies, i8))
-         if (extent <= 0 .and. entry%indexed) then
-            call reject(checked, g, e, 'takes no index')
-         else if (extent == one_value) then
-            if (given > 1) call reject(checked, g, e, 'takes one value, not ' &
-               //count_text(given)//comma_hint(checked%document, entry))
-         else if (extent == any_list) then
-            if (given > max_list) call reject(checked, g, e, 'takes at most '//to_text(max_list)//' values')
-         else if (checked%extents(extent)%count > 0) then
-            call check_extent(checked, g, e, checked%extents(extent), given)
-         end if
-      end associate
-   end subroutine check_count
-
-   !> The same for an array over rods, nodes, hinges ...
-   subroutine check_extent(checked, g, e, extent, given)
-      type(checked_document), intent(inout) :: checked
-      integer, intent(in) :: g, e
-      type(schema_extent), intent(in) :: extent
-      integer(i8), intent(in) :: given !! values
-      integer :: upper, wanted
-
-      upper = extent%lower + extent%count - 1
-      wanted = extent%count
-      associate (entry => checked%document%entries(e))
-         if (entry%indexed) then
-            wanted = entry%upper - entry%lower + 1
-            if (entry%lower < extent%lower .or. entry%upper > upper) then
-               call reject(checked, g, e, 'there is no such '//trim(extent%name)//'; they are numbered ' &
-                  //to_text(extent%lower)//'..'//to_text(upper))
-               return
-            end if
-         end if
-         if (given == 1 .or. given == wanted) return
-         if (wanted == 1) then
-            call reject(checked, g, e, 'takes one value, not '//count_text(given)//comma_hint(checked%document, entry))
-         else
-            call reject(checked, g, e, 'takes 1 or '//to_text(wanted)//' values, one per '//trim(extent%name) &
-               //', not '//count_text(given)//comma_hint(checked%document, entry))
-         end if
-      end associate
-   end subroutine check_extent
-
-   pure function count_text(n) result(text)
-      integer(i8), intent(in) :: n
-      character(len=:), allocatable :: text
-      text = 'many'
-      if (n <= huge(1)) text = to_text(int(n))
-   end function count_text
-
-   !> '1,5' may be meant as 1.5: say so if two whole numbers stand with nothing but a comma between them.
-   pure function comma_hint(document, entry) result(hint)
-      type(namelist_document), intent(in) :: document
-      type(namelist_entry), intent(in) :: entry
-      character(len=:), allocatable :: hint
-      integer :: first, v
-
-      hint = ''
-      do v = entry%first + 1, entry%last
-         first = document%values(v)%first
-         if (first < 3 .or. document%values(v - 1)%last /= first - 2) cycle
-         if (document%text(first - 1:first - 1) /= ',') cycle
-         if (.not. (is_digit(document%text(first - 2:first - 2)) .and. is_digit(document%text(first:first)))) cycle
-         hint = '; a decimal comma? write '//shown_value(document, document%values(v - 1))//'.' &
-            //shown_value(document, document%values(v))
-         return
-      end do
-   end function comma_hint
-
-   !> The same key, or the same element of it, twice in group `g`; elements left without a value.
-   subroutine check_repeated(checked, g)
-      type(checked_document), intent(inout) :: checked
-      integer, intent(in) :: g
-      integer :: whole(size(checked%rows)) !! line of the assignment without index + 1; 0: none
-      logical :: indexed(size(checked%rows))
-      integer :: e, r
-
-      whole = 0
-      indexed = .false.
-      associate (document => checked%document)
-         do e = document%groups(g)%first, document%groups(g)%last
-            r = checked%row(e)
-            if (r == 0) cycle
-            if (document%entries(e)%indexed) then
-               if (checked%ok(e)) indexed(r) = .true.
-            else
-               if (whole(r) > 0) call reject(checked, g, e, 'the key stands in line ' &
-                  //to_text(whole(r) - 1)//' already')
-               if (whole(r) == 0) whole(r) = document%entries(e)%line + 1
-            end if
-         end do
-      end associate
-      do r = 1, size(checked%rows)
-         if (indexed(r)) call check_elements(checked, g, r, whole(r) > 0)
-      end do
-   end subroutine check_repeated
-
-   !> The indexed assignments to one key.
-   subroutine check_elements(checked, g, r, filled)
-      type(checked_document), intent(inout) :: checked
-      integer, intent(in) :: g, r
-      logical, intent(in) :: filled !! an assignment without index gives the elements that no index names
-      integer, allocatable :: owner(:)
-      integer :: e, first, i
-
-      associate (document => checked%document, extent => checked%extents(checked%rows(r)%extent))
-         if (extent%count == 0) return
-         allocate (owner(extent%lower:extent%lower + extent%count - 1), source=0)
-         first = 0
-         do e = document%groups(g)%first, document%groups(g)%last
-            if (checked%row(e) /= r .or. .not. document%entries(e)%indexed) cycle
-            if (first == 0) first = e
-            call claim(checked, g, e, owner)
-         end do
-         if (filled .or. all(owner > 0)) return
-         if (checked%rows(r)%default /= 'required' .and. checked%rows(r)%default /= 'depends') return
-         if (.not. is_sound(checked, trim(checked%rows(r)%group), 1, trim(checked%rows(r)%key))) return
-         i = extent%lower + findloc(owner, 0, 1) - 1
-         call checked%faults%add(document%entries(first)%line, '&'//trim(checked%rows(r)%group)//' ' &
-            //trim(checked%rows(r)%key)//'('//to_text(i)//'): is required, as other elements are given')
-      end associate
-   end subroutine check_elements
-
-   !> Let entry `e` own the elements it names; each may have one owner.
-   subroutine claim(checked, g, e, owner)
-      type(checked_document), intent(inout) :: checked
-      integer, intent(in) :: g, e
-      integer, allocatable, intent(inout) :: owner(:)
-      integer :: i
-
-      associate (entry => checked%document%entries(e))
-         if (entry%lower < lbound(owner, 1) .or. entry%upper > ubound(owner, 1)) return
-         do i = entry%lower, entry%upper
-            if (owner(i) > 0 .and. .not. entry%forced) then
-               call reject(checked, g, e, 'element '//to_text(i)//' is given in line ' &
-                  //to_text(checked%document%entries(owner(i))%line)//' already')
-               return
-            end if
-            owner(i) = e
-         end do
-      end associate
-   end subroutine claim
 
    !> The entry that gives a key in the `instance`-th group of that name; 0 if there is none.
    integer function entry_of(checked, group, instance, key, any_state) result(found)

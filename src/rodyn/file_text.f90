@@ -37,15 +37,16 @@ contains
          if (bytes > 0) read (unit, iostat=stat, iomsg=reason) text
          if (stat /= 0) call refuse(path, reason, error)
       end if
-      close (unit, iostat=stat)
+      close (unit)
    end subroutine read_text_file
 
    !> The last part of the system's message says why.
    subroutine refuse(path, reason, error)
       character(len=*), intent(in) :: path, reason
       type(error_type), allocatable, intent(out) :: error
-      call raise(error, path//': cannot be read ('//trim(adjustl(reason(index(reason, ': ', back=.true.) + 1:)))//')', &
-         exit_bad_input)
+      integer :: first
+      first = index(reason, ': ', back=.true.) + 1
+      call raise(error, path//': cannot be read ('//trim(adjustl(reason(first:)))//')', exit_bad_input)
    end subroutine refuse
 
 end module rodyn_file_text

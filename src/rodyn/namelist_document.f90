@@ -86,7 +86,8 @@ contains
          call move_alloc(larger, document%groups)
       end if
       document%n_groups = document%n_groups + 1
-      document%groups(document%n_groups) = namelist_group(lower(name), line, document%n_entries + 1, document%n_entries)
+      document%groups(document%n_groups) = namelist_group(lower(name), line, first=document%n_entries + 1, &
+         last=document%n_entries)
    end subroutine add_group
 
    !> Append an entry, without values, to the last group.
@@ -162,10 +163,11 @@ contains
       type(namelist_document), intent(in) :: document
       type(namelist_value), intent(in) :: value
       character(len=:), allocatable :: text
-      character(len=value%last - value%first + 1) :: buffer
+      character(len=:), allocatable :: buffer ! not automatic: a text may be larger than the stack
       character(len=1) :: quote
       integer :: i, n
 
+      allocate (character(len=value%last - value%first + 1) :: buffer)
       quote = document%text(value%first - 1:value%first - 1)
       n = 0
       i = value%first

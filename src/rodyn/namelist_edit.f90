@@ -54,23 +54,37 @@ contains
       character(len=:), allocatable, intent(out) :: group, name !! in lower case; `name` with its index
       integer, intent(out) :: instance
       type(error_type), allocatable, intent(out) :: error
-      integer :: dot, paren, stat
+      integer :: dot, paren
+      logical :: ok
 
-      stat = 0
+      ok = .true.
       instance = 0
       dot = index(key, '.')
       group = trim(adjustl(lower(key(:max(0, dot - 1)))))
       name = trim(adjustl(lower(key(dot + 1:))))
       paren = index(group, '(')
       if (paren > 0) then
-         if (verify(group(paren + 1:), '0123456789)') /= 0 .or. index(group, ')') /= len(group)) stat = 1
-         if (stat == 0) read (group(paren + 1:len(group) - 1), '(i9)', iostat=stat) instance
-         if (instance < 1) stat = 1
+         call read_instance(group(paren:), instance, ok)
          group = group(:paren - 1)
       end if
-      if (dot == 0 .or. stat /= 0 .or. .not. is_name(group)) call raise(error, key//': a key is written group.name', &
-         exit_bad_input)
+      if (dot > 0 .and. ok .and. is_name(group)) return
+      call raise(error, key//': a key is written group.name', exit_bad_input)
    end subroutine split_key
+
+   !> '(2)' -> 2
+   subroutine read_instance(text, instance, ok)
+      character(len=*), intent(in) :: text
+      integer, intent(out) :: instance
+      logical, intent(out) :: ok
+      integer :: last
+
+      instance = 0
+      last = len(text) - 1
+      ok = last >= 2 .and. last <= 10 .and. index(text, ')') == last + 1
+      if (ok) ok = verify(text(2:last), '0123456789') == 0
+      if (ok) read (text(2:last), *) instance
+      ok = ok .and. instance >= 1
+   end subroutine read_instance
 
    !> A document with a single nameless group holding the one assignment.
    subroutine parse_one(name, text, fresh, s, error)

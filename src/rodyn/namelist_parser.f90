@@ -125,8 +125,9 @@ contains
             return
          case ('&')
             exit
+         case default
+            call parse_assignment(document, s)
          end select
-         call parse_assignment(document, s)
       end do
       call complain_of_open_group(document, g, s)
    end subroutine parse_group
@@ -157,7 +158,8 @@ contains
          s = next
          call parse_values(document, s)
       else if (scan(document%text(first:first), '"''') == 1) then
-         s%at = min(first + 1 + span(document%text(first + 1:), document%text(first:first)//lf), len(document%text)) + 1
+         s%at = first + 2 + span(document%text(first + 1:), document%text(first:first)//lf)
+         s%at = min(s%at, len(document%text) + 1)
          if (document%text(s%at - 1:s%at - 1) == lf) s%at = s%at - 1
          call fault_in_group(document, s%line, document%text(first:s%at - 1), 'text without a key before it')
       else

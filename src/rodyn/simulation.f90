@@ -42,7 +42,9 @@ contains
       real(wp), allocatable :: ends(:)
       integer :: segment, next
 
-      ends = [motion%dynamics%scene%loads%switches, t_end]
+      associate (switches => motion%dynamics%scene%loads%switches)
+         ends = [pack(switches, switches < t_end), t_end]
+      end associate
       t = 0.0_wp
       next = 1
       do segment = 1, size(ends)

@@ -71,9 +71,10 @@ contains
    pure function quoted(text) result(string)
       character(len=*), intent(in) :: text
       character(len=:), allocatable :: string
-      character(len=2*len(text) + 2) :: buffer
+      character(len=:), allocatable :: buffer
       integer :: i, n
 
+      allocate (character(len=2*len(text) + 2) :: buffer)
       buffer(1:1) = "'"
       n = 1
       do i = 1, len(text)

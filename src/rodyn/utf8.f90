@@ -61,6 +61,8 @@ contains
          if (second < 144) is_tail = .false.
       case (244)
          if (second > 143) is_tail = .false.
+      case default
+         continue
       end select
    end function is_tail
 

@@ -3,7 +3,7 @@ module rodyn_value_rules
    use rodyn_namelist_document, only: namelist_document, namelist_value, string_content, is_integer, &
       is_long_integer, is_real, is_too_large, is_too_small, is_not_finite, is_logical, is_string
    use rodyn_schema, only: schema_row, type_integer, type_logical, type_real, type_word, requirement, rule_text, &
-      satisfies
+      satisfies, up_to
    use rodyn_text, only: lower, word, word_count
    implicit none (type, external)
    private
@@ -32,7 +32,7 @@ contains
       case default
          if (value%kind /= is_string) then
             rule = requirement(row)
-         else if (value%last - value%first + 1 > nint(row%high)) then
+         else if (row%rule == up_to) then
             if (len(string_content(document, value)) > nint(row%high)) rule = rule_text(row)
          end if
       end select

@@ -1,7 +1,9 @@
-!> Fills a case from a checked document: defaults, then what the file says, then single elements.
-module rodyn_case_loader
+!> Fills a configuration from a checked document: defaults, then what the file says, then single elements.
+!> It knows nothing of cases; any schema will do.
+module rodyn_field_loader
    use rodyn_kinds, only: wp
-   use rodyn_case_visitor, only: case_visitor
+   use rodyn_case_config, only: name_length
+   use rodyn_field_visitor, only: field_visitor
    use rodyn_checked_document, only: checked_document, group_at
    use rodyn_namelist_document, only: namelist_value, string_content
    use rodyn_schema, only: any_list
@@ -9,10 +11,10 @@ module rodyn_case_loader
    use rodyn_value_rules, only: matching_word
    implicit none (type, external)
    private
-   public :: case_loader
+   public :: field_loader
 
    !> Values that break a rule are passed over: their key keeps its default, and the fault is on the list already.
-   type, extends(case_visitor) :: case_loader
+   type, extends(field_visitor) :: field_loader
       type(checked_document), pointer :: checked => null()
       integer :: group = 0 !! the open group of the document; 0: not in the file
       integer :: row = 0   !! the row visited last; rows are visited in the order of the table
@@ -25,12 +27,13 @@ module rodyn_case_loader
       procedure :: logical_field
       procedure :: word_field
       procedure :: text_field
-   end type case_loader
+      procedure :: text_list
+   end type field_loader
 
 contains
 
    subroutine open_group(self, group, instance)
-      class(case_loader), intent(inout) :: self
+      class(field_loader), intent(inout) :: self
       character(len=*), intent(in) :: group
       integer, intent(in) :: instance
       integer :: r
@@ -43,13 +46,13 @@ contains
    end subroutine open_group
 
    subroutine close_group(self)
-      class(case_loader), intent(inout) :: self
+      class(field_loader), intent(inout) :: self
       self%group = 0
    end subroutine close_group
 
    !> Go to the row of a key, and find the last valid entry for it; 0 if there is none.
    integer function find(self, key) result(found)
-      class(case_loader), intent(inout) :: self
+      class(field_loader), intent(inout) :: self
       character(len=*), intent(in) :: key
 
       found = 0
@@ -68,7 +71,7 @@ contains
 
    !> The one value of an entry.
    function value_of(self, entry) result(value)
-      class(case_loader), intent(in) :: self
+      class(field_loader), intent(in) :: self
       integer, intent(in) :: entry
       type(namelist_value) :: value
       value = self%checked%document%values(self%checked%document%entries(entry)%first)
@@ -76,14 +79,14 @@ contains
 
    !> Does the row have a default value of its own?
    logical function has_default(self)
-      class(case_loader), intent(in) :: self
+      class(field_loader), intent(in) :: self
       associate (default => self%checked%rows(self%row)%default)
          has_default = default /= 'required' .and. default /= 'depends'
       end associate
    end function has_default
 
    subroutine set_default(self, x)
-      class(case_loader), intent(in) :: self
+      class(field_loader), intent(in) :: self
       real(wp), intent(inout) :: x !! as it is if the row has no default
       if (.not. has_default(self)) return
       x = 0.0_wp
@@ -92,7 +95,7 @@ contains
    end subroutine set_default
 
    subroutine real_field(self, key, x)
-      class(case_loader), intent(inout) :: self
+      class(field_loader), intent(inout) :: self
       character(len=*), intent(in) :: key
       real(wp), intent(inout) :: x
       type(namelist_value) :: value
@@ -109,7 +112,7 @@ contains
 
    !> Arrays over an extent get its length; lists the length they have in the file.
    subroutine array_field(self, key, x)
-      class(case_loader), intent(inout) :: self
+      class(field_loader), intent(inout) :: self
       character(len=*), intent(in) :: key
       real(wp), allocatable, intent(inout) :: x(:)
       real(wp) :: default
@@ -141,7 +144,7 @@ contains
 
    !> Is this a valid entry for the row, with or without an index?
    logical function takes(self, entry, indexed)
-      class(case_loader), intent(in) :: self
+      class(field_loader), intent(in) :: self
       integer, intent(in) :: entry
       logical, intent(in) :: indexed
       takes = self%checked%row(entry) == self%row .and. self%checked%ok(entry) .and. &
@@ -149,7 +152,7 @@ contains
    end function takes
 
    integer function list_length(self, entry)
-      class(case_loader), intent(in) :: self
+      class(field_loader), intent(in) :: self
       integer, intent(in) :: entry !! 0: none
       list_length = 0
       if (entry == 0) return
@@ -160,7 +163,7 @@ contains
 
    !> Write out the repeat counts of an entry; one single value fills all of `x`.
    subroutine spread_values(self, entry, x)
-      class(case_loader), intent(in) :: self
+      class(field_loader), intent(in) :: self
       integer, intent(in) :: entry
       real(wp), intent(inout) :: x(:)
       integer :: at, v
@@ -179,7 +182,7 @@ contains
    end subroutine spread_values
 
    subroutine integer_field(self, key, x)
-      class(case_loader), intent(inout) :: self
+      class(field_loader), intent(inout) :: self
       character(len=*), intent(in) :: key
       integer, intent(inout) :: x
       type(namelist_value) :: value
@@ -195,7 +198,7 @@ contains
    end subroutine integer_field
 
    subroutine logical_field(self, key, x)
-      class(case_loader), intent(inout) :: self
+      class(field_loader), intent(inout) :: self
       character(len=*), intent(in) :: key
       logical, intent(inout) :: x
       type(namelist_value) :: value
@@ -212,9 +215,9 @@ contains
 
    !> A word takes the spelling of the table.
    subroutine word_field(self, key, x)
-      class(case_loader), intent(inout) :: self
+      class(field_loader), intent(inout) :: self
       character(len=*), intent(in) :: key
-      character(len=*), intent(inout) :: x
+      character(len=name_length), intent(inout) :: x
       integer :: e
 
       e = find(self, key)
@@ -228,7 +231,7 @@ contains
    end subroutine word_field
 
    subroutine text_field(self, key, x)
-      class(case_loader), intent(inout) :: self
+      class(field_loader), intent(inout) :: self
       character(len=*), intent(in) :: key
       character(len=:), allocatable, intent(inout) :: x
       integer :: e
@@ -241,6 +244,29 @@ contains
       end if
    end subroutine text_field
 
+   !> A list of texts, all as long as the longest; without values if the key is not given.
+   subroutine text_list(self, key, x)
+      class(field_loader), intent(inout) :: self
+      character(len=*), intent(in) :: key
+      character(len=:), allocatable, intent(out) :: x(:)
+      integer :: at, e, longest, v
+
+      e = find(self, key)
+      if (e == 0) then
+         allocate (character(len=1) :: x(0))
+         return
+      end if
+      associate (entry => self%checked%document%entries(e), values => self%checked%document%values)
+         longest = maxval(values(entry%first:entry%last)%last - values(entry%first:entry%last)%first) + 1
+         allocate (character(len=longest) :: x(list_length(self, e)))
+         at = 0
+         do v = entry%first, entry%last
+            x(at + 1:at + values(v)%copies) = string_content(self%checked%document, values(v))
+            at = at + values(v)%copies
+         end do
+      end associate
+   end subroutine text_list
+
    !> The text between the quotes of a default.
    pure function unquoted(default) result(text)
       character(len=*), intent(in) :: default
@@ -248,4 +274,4 @@ contains
       text = default(2:len_trim(default) - 1)
    end function unquoted
 
-end module rodyn_case_loader
+end module rodyn_field_loader

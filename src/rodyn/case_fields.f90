@@ -1,96 +1,17 @@
-!> Walks through all keys of a case in the order of the table. A loader fills the case on its way, a writer
-!> prints it: so there is one list that ties keys to components.
-module rodyn_case_visitor
-   use rodyn_kinds, only: wp
+!> All keys of a case, each with its component, in the order of the table.
+module rodyn_case_fields
    use rodyn_case_config, only: case_config, chain_config, initial_config, load_config, model_config, &
       output_config, solver_config, spacecraft_config
+   use rodyn_field_visitor, only: field_visitor
    implicit none (type, external)
    private
-   public :: case_visitor, visit_case, law_takes
-
-   !> What is done at each key
-   type, abstract :: case_visitor
-   contains
-      procedure(open_interface), deferred :: open_group
-      procedure(close_interface), deferred :: close_group
-      procedure(real_interface), deferred :: real_field
-      procedure(array_interface), deferred :: array_field
-      procedure(integer_interface), deferred :: integer_field
-      procedure(logical_interface), deferred :: logical_field
-      procedure(word_interface), deferred :: word_field
-      procedure(text_interface), deferred :: text_field
-      generic :: field => real_field, array_field, integer_field, logical_field
-   end type case_visitor
-
-   abstract interface
-      subroutine open_interface(self, group, instance)
-         import :: case_visitor
-         implicit none (type, external)
-         class(case_visitor), intent(inout) :: self
-         character(len=*), intent(in) :: group
-         integer, intent(in) :: instance !! 1, 2, ... of a repeated group
-      end subroutine open_interface
-
-      subroutine close_interface(self)
-         import :: case_visitor
-         implicit none (type, external)
-         class(case_visitor), intent(inout) :: self
-      end subroutine close_interface
-
-      subroutine real_interface(self, key, x)
-         import :: case_visitor, wp
-         implicit none (type, external)
-         class(case_visitor), intent(inout) :: self
-         character(len=*), intent(in) :: key
-         real(wp), intent(inout) :: x
-      end subroutine real_interface
-
-      subroutine array_interface(self, key, x)
-         import :: case_visitor, wp
-         implicit none (type, external)
-         class(case_visitor), intent(inout) :: self
-         character(len=*), intent(in) :: key
-         real(wp), allocatable, intent(inout) :: x(:)
-      end subroutine array_interface
-
-      subroutine integer_interface(self, key, x)
-         import :: case_visitor
-         implicit none (type, external)
-         class(case_visitor), intent(inout) :: self
-         character(len=*), intent(in) :: key
-         integer, intent(inout) :: x
-      end subroutine integer_interface
-
-      subroutine logical_interface(self, key, x)
-         import :: case_visitor
-         implicit none (type, external)
-         class(case_visitor), intent(inout) :: self
-         character(len=*), intent(in) :: key
-         logical, intent(inout) :: x
-      end subroutine logical_interface
-
-      subroutine word_interface(self, key, x)
-         import :: case_visitor
-         implicit none (type, external)
-         class(case_visitor), intent(inout) :: self
-         character(len=*), intent(in) :: key
-         character(len=*), intent(inout) :: x
-      end subroutine word_interface
-
-      subroutine text_interface(self, key, x)
-         import :: case_visitor
-         implicit none (type, external)
-         class(case_visitor), intent(inout) :: self
-         character(len=*), intent(in) :: key
-         character(len=:), allocatable, intent(inout) :: x
-      end subroutine text_interface
-   end interface
+   public :: visit_case, law_takes
 
 contains
 
    !> Visit every key of a case whose `loads` have been allocated.
    subroutine visit_case(visitor, config)
-      class(case_visitor), intent(inout) :: visitor
+      class(field_visitor), intent(inout) :: visitor
       type(case_config), intent(inout) :: config
       integer :: i
 
@@ -111,7 +32,7 @@ contains
    end subroutine visit_case
 
    subroutine visit_spacecraft(visitor, spacecraft)
-      class(case_visitor), intent(inout) :: visitor
+      class(field_visitor), intent(inout) :: visitor
       type(spacecraft_config), intent(inout) :: spacecraft
       call visitor%open_group('spacecraft', 1)
       call visitor%field('mass', spacecraft%mass)
@@ -123,7 +44,7 @@ contains
    end subroutine visit_spacecraft
 
    subroutine visit_chain(visitor, chain)
-      class(case_visitor), intent(inout) :: visitor
+      class(field_visitor), intent(inout) :: visitor
       type(chain_config), intent(inout) :: chain
       call visitor%open_group('chain', 1)
       call visitor%field('n_rods', chain%n_rods)
@@ -138,7 +59,7 @@ contains
    end subroutine visit_chain
 
    subroutine visit_model(visitor, model)
-      class(case_visitor), intent(inout) :: visitor
+      class(field_visitor), intent(inout) :: visitor
       type(model_config), intent(inout) :: model
       call visitor%open_group('model', 1)
       call visitor%word_field('formulation', model%formulation)
@@ -150,7 +71,7 @@ contains
    end subroutine visit_model
 
    subroutine visit_initial(visitor, initial)
-      class(case_visitor), intent(inout) :: visitor
+      class(field_visitor), intent(inout) :: visitor
       type(initial_config), intent(inout) :: initial
       call visitor%open_group('initial', 1)
       call visitor%field('phi', initial%phi)
@@ -170,7 +91,7 @@ contains
 
    !> Only the keys that the target and the law of this load have.
    subroutine visit_load(visitor, instance, load)
-      class(case_visitor), intent(inout) :: visitor
+      class(field_visitor), intent(inout) :: visitor
       integer, intent(in) :: instance
       type(load_config), intent(inout) :: load
       call visitor%open_group('load', instance)
@@ -189,7 +110,7 @@ contains
    end subroutine visit_load
 
    subroutine visit_solver(visitor, solver)
-      class(case_visitor), intent(inout) :: visitor
+      class(field_visitor), intent(inout) :: visitor
       type(solver_config), intent(inout) :: solver
       call visitor%open_group('solver', 1)
       call visitor%word_field('method', solver%method)
@@ -203,7 +124,7 @@ contains
    end subroutine visit_solver
 
    subroutine visit_output(visitor, output)
-      class(case_visitor), intent(inout) :: visitor
+      class(field_visitor), intent(inout) :: visitor
       type(output_config), intent(inout) :: output
       call visitor%open_group('output', 1)
       call visitor%text_field('file', output%file)
@@ -229,4 +150,4 @@ contains
       end select
    end function law_takes
 
-end module rodyn_case_visitor
+end module rodyn_case_fields
