@@ -49,7 +49,7 @@ module test_integrators
    end type impatient
 
    real(wp), parameter :: pi = acos(-1.0_wp)
-   character(len=5), parameter :: methods(3) = [character(len=5) :: 'adams', 'bdf', 'erk']
+   character(len=6), parameter :: methods(4) = [character(len=6) :: 'adams', 'bdf', 'erk', 'dop853']
 
 contains
 

@@ -42,7 +42,7 @@ contains
             return
          end if
       end do
-      print *, worst
+
    end subroutine test_agreement
 
    subroutine accelerations_by(config, kernel, acceleration, error)

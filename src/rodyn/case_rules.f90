@@ -123,8 +123,8 @@ contains
       type(checked_document), intent(inout) :: checked
       type(case_config), intent(in) :: config
       if (.not. is_sound(checked, 'solver', 1, 'method')) return
-      if (config%solver%fixed_step <= 0.0_wp .or. config%solver%method == 'erk') return
-      call blame(checked, 'solver', 1, 'fixed_step', "is possible with method = 'erk' only")
+      if (config%solver%fixed_step <= 0.0_wp .or. any(config%solver%method == ['erk   ', 'dop853'])) return
+      call blame(checked, 'solver', 1, 'fixed_step', "is possible with method = 'erk' or 'dop853' only")
    end subroutine check_solver
 
    !> A load on a node needs an existing node and is a force.

@@ -6,13 +6,14 @@ module rodyn_integrators
    use rodyn_integrator, only: integrator_type, solver_options
    use rodyn_cvode_integrator, only: cvode_integrator, new_cvode_integrator
    use rodyn_erk_integrator, only: erk_integrator, new_erk_integrator
+   use rodyn_dop853_integrator, only: dop853_integrator, new_dop853_integrator
    use rodyn_sundials_base, only: sundials_version
    implicit none (type, external)
    private
    public :: new_integrator, integrator_names, sundials_version
 
    !> What `method` may be.
-   character(len=5), parameter :: integrator_names(3) = [character(len=5) :: 'adams', 'bdf', 'erk']
+   character(len=6), parameter :: integrator_names(4) = [character(len=6) :: 'adams', 'bdf', 'erk', 'dop853']
 
 contains
 
@@ -26,6 +27,7 @@ contains
 
       type(cvode_integrator), allocatable :: cvode
       type(erk_integrator), allocatable :: erk
+      type(dop853_integrator), allocatable :: dop853
 
       call check_options(options, error)
       if (allocated(error)) return
@@ -38,8 +40,12 @@ contains
          allocate (erk)
          call new_erk_integrator(erk, system, options, error)
          call move_alloc(erk, integrator)
+      case ('dop853')
+         allocate (dop853)
+         call new_dop853_integrator(dop853, system, options, error)
+         call move_alloc(dop853, integrator)
       case default
-         call raise(error, 'no integrator is called '''//trim(method)//'''; there are adams, bdf and erk')
+         call raise(error, 'no integrator is called '''//trim(method)//'''; there are adams, bdf, erk and dop853')
       end select
    end subroutine new_integrator
 

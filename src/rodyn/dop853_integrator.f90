@@ -1,0 +1,367 @@
+!> Explicit Runge-Kutta of order 8 with a 5th- and a 3rd-order error estimate (Dormand & Prince, DOP853).
+!>
+!> The method is that of Hairer, Norsett & Wanner (Solving ODEs I, sec. II.5 and II.10). It stands here because the
+!> right-hand side is so cheap that a general library's overhead costs more than it does, and for one thing no
+!> library does: the state is summed with compensation (Kahan), so that a million steps lose no more digits
+!> than one. Outputs inside a step are computed by one shorter step from its start, as accurate as the steps
+!> themselves, so they never change the steps.
+module rodyn_dop853_integrator
+   use rodyn_kinds, only: wp, i8
+   use rodyn_errors, only: error_type, raise
+   use rodyn_ode, only: ode_system
+   use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, time_text
+   use rodyn_dop853_tableau
+   implicit none (type, external)
+   private
+   public :: dop853_integrator, new_dop853_integrator
+
+   integer, parameter :: n_stages = 12
+
+   type, extends(integrator_type) :: dop853_integrator
+      private
+      real(wp) :: t = 0.0_wp             !! end of the last step [s]
+      real(wp) :: t_lost = 0.0_wp        !! what rounding took from t so far [s]
+      real(wp) :: t_before = 0.0_wp      !! its start [s]
+      real(wp) :: h = 0.0_wp             !! next step [s]
+      real(wp), allocatable :: y(:)      !! state at t (n_states)
+      real(wp), allocatable :: lost(:)   !! what rounding took from y so far (n_states)
+      real(wp), allocatable :: f(:)      !! rates at t
+      real(wp), allocatable :: y_before(:), f_before(:) !! at t_before
+      real(wp), allocatable :: k(:, :)   !! rates of the stages (n_states, 12)
+      real(wp), allocatable :: stage(:), increment(:), y_new(:) !! workspace
+      real(wp) :: t_first = 0.0_wp       !! start of the interval, where the grid of fixed steps begins [s]
+      integer(i8) :: n_grid = 0, i_grid = 0 !! fixed steps of the interval; steps done
+      type(solver_statistics) :: counts
+   contains
+      procedure :: start
+      procedure :: advance
+      procedure :: statistics
+      procedure :: finalize
+   end type dop853_integrator
+
+contains
+
+   !> Create an integrator for `system`, which must outlive it.
+   subroutine new_dop853_integrator(self, system, options, error)
+      type(dop853_integrator), intent(out) :: self
+      class(ode_system), target, intent(inout) :: system
+      type(solver_options), intent(in) :: options
+      type(error_type), allocatable, intent(out) :: error
+
+      if (options%order /= 0 .and. options%order /= 8) then
+         call raise(error, "order: 'dop853' is of order 8")
+         return
+      end if
+      self%system => system
+      self%options = options
+      associate (n => system%n_states)
+         allocate (self%y(n), self%lost(n), self%f(n), self%y_before(n), self%f_before(n), self%k(n, n_stages), &
+                   self%stage(n), self%increment(n), self%y_new(n), source=0.0_wp)
+      end associate
+      self%counts%last_order = 8
+   end subroutine new_dop853_integrator
+
+   !> First start, or exact restart. `set_stop` comes before.
+   subroutine start(self, t, y, error)
+      class(dop853_integrator), intent(inout) :: self
+      real(wp), intent(in) :: t    !! [s]
+      real(wp), intent(in) :: y(:) !! (n_states)
+      type(error_type), allocatable, intent(out) :: error
+      logical :: ok
+
+      call self%begin_interval(t, y, error)
+      if (allocated(error)) return
+      self%t = t
+      self%t_before = t
+      self%t_first = t
+      self%t_lost = 0.0_wp
+      if (self%n_starts == 1 .or. any(abs(self%y - y) > 0.0_wp)) then
+         self%y(:) = y
+         self%lost = 0.0_wp
+      end if ! else the run goes on from its own last state, whose lost digits are still known
+      self%i_grid = 0
+      self%n_grid = 0
+      call evaluate(self, t, self%y, self%f, ok)
+      if (.not. ok) then
+         call raise(error, 'dop853 at t = '//time_text(t)//' s: the right-hand side cannot be evaluated')
+         return
+      end if
+      if (self%options%fixed_step > 0.0_wp) then
+         self%n_grid = max(1_i8, ceiling((self%t_stop - t)/self%options%fixed_step*(1.0_wp - 4.0_wp*epsilon(1.0_wp)), i8))
+      else
+         call first_step(self, error)
+      end if
+   end subroutine start
+
+   !> Integrate to exactly t_out.
+   subroutine advance(self, t_out, y, t, error)
+      class(dop853_integrator), intent(inout) :: self
+      real(wp), intent(in) :: t_out !! not after the stop time [s]
+      real(wp), contiguous, intent(out) :: y(:) !! (n_states)
+      real(wp), intent(out) :: t    !! t_out, or the last good time [s]
+      type(error_type), allocatable, intent(out) :: error
+      logical :: ok
+
+      call self%check_target(t_out, error)
+      do while (.not. allocated(error) .and. self%t < t_out)
+         call step(self, error)
+      end do
+      t = self%t
+      y = self%y
+      if (allocated(error) .or. t <= t_out) return
+      associate (h => t_out - self%t_before)
+         call stages(self%system, size(y), self%t_before, h, self%y_before, self%f_before, self%k, self%stage, ok)
+         self%counts%n_rhs = self%counts%n_rhs + n_stages - 1
+         call add_increment(size(y), h, self%k, self%increment)
+         y = self%y_before + self%increment
+      end associate
+      if (.not. ok) then
+         call raise(error, 'dop853: output at t = '//time_text(t_out)//' s: the right-hand side cannot be evaluated')
+         return
+      end if
+      t = t_out
+   end subroutine advance
+
+   !> One accepted step: try, and shorten, until the error is below one.
+   subroutine step(self, error)
+      class(dop853_integrator), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), parameter :: safety = 0.9_wp, shrink = 1.0_wp/3.0_wp, grow = 6.0_wp ! Hairer's
+      real(wp) :: h, t_new, norm, factor
+      logical :: ok, rejected
+
+      rejected = .false.
+      do
+         call self%permit_step(error)
+         if (allocated(error)) return
+         call choose_end(self, h, t_new)
+         if (h <= 4.0_wp*spacing(self%t)) then
+            call raise(error, 'dop853 at t = '//time_text(self%t)//' s: the step size fell below rounding error')
+            return
+         end if
+         call stages(self%system, size(self%y), self%t, h, self%y, self%f, self%k, self%stage, ok)
+         self%counts%n_rhs = self%counts%n_rhs + n_stages - 1
+         if (ok) then
+            call add_increment(size(self%y), h, self%k, self%increment)
+            self%y_new(:) = self%y + (self%increment - self%lost)
+            norm = 0.0_wp
+            if (self%n_grid == 0) norm = error_norm(self%system%n_controlled, h, self%k(:self%system%n_controlled, :), &
+                                                    self%y, self%y_new, self%options%rtol, self%options%atol)
+            if (norm <= 1.0_wp) call evaluate(self, t_new, self%y_new, self%stage, ok)
+         end if
+         if (.not. ok) norm = huge(1.0_wp) ! not finite: shorten by the most
+         if (.not. norm <= huge(1.0_wp)) norm = huge(1.0_wp)
+         if (norm <= 1.0_wp) exit
+         if (self%n_grid > 0) then
+            call raise(error, 'dop853 at t = '//time_text(self%t)//' s: the state is no longer finite')
+            return
+         end if
+         self%counts%n_error_test_failures = self%counts%n_error_test_failures + 1
+         self%n_steps = self%n_steps - 1
+         rejected = .true.
+         self%h = h*max(shrink, safety*norm**(-0.125_wp))
+      end do
+      call accept(self, h, t_new)
+      if (self%n_grid > 0) return
+      factor = grow
+      if (norm > 0.0_wp) factor = min(grow, max(shrink, safety*norm**(-0.125_wp)))
+      if (rejected) factor = min(1.0_wp, factor)
+      ! A step cut short by the stop time says little about the next one.
+      if (t_new < self%t_stop .or. h*factor > self%h) self%h = h*factor
+      if (self%options%max_step > 0.0_wp) self%h = min(self%h, self%options%max_step)
+   end subroutine step
+
+   !> The step to try and the time it ends at: on the stop time if that is near, or on the grid of fixed steps.
+   subroutine choose_end(self, h, t_new)
+      class(dop853_integrator), intent(in) :: self
+      real(wp), intent(out) :: h, t_new
+      if (self%n_grid > 0) then
+         t_new = self%t_first + (self%t_stop - self%t_first)*(real(self%i_grid + 1, wp)/real(self%n_grid, wp))
+         if (self%i_grid + 1 == self%n_grid) t_new = self%t_stop
+         h = t_new - self%t
+         return
+      end if
+      h = self%h
+      t_new = self%t + (h - self%t_lost)
+      if (t_new < self%t_stop) then
+         ! Two even steps rather than one and a sliver.
+         if (self%t + 1.8_wp*h > self%t_stop) h = 0.5_wp*(self%t_stop - self%t)
+         if (h < self%h) t_new = self%t + (h - self%t_lost)
+      else
+         t_new = self%t_stop
+         h = self%t_stop - self%t
+      end if
+   end subroutine choose_end
+
+   !> Make the new state the current one, with the digits that rounding took from it.
+   subroutine accept(self, h, t_new)
+      class(dop853_integrator), intent(inout) :: self
+      real(wp), intent(in) :: h, t_new
+
+      self%lost = (self%y_new - self%y) - (self%increment - self%lost)
+      call swap(self%y_before, self%y)
+      call swap(self%y, self%y_new)
+      call swap(self%f_before, self%f)
+      call swap(self%f, self%stage)
+      self%t_before = self%t
+      self%t_lost = (t_new - self%t) - (h - self%t_lost)
+      if (t_new >= self%t_stop .or. self%n_grid > 0) self%t_lost = 0.0_wp
+      self%t = t_new
+      self%t_good = t_new
+      self%i_grid = self%i_grid + 1
+      self%counts%last_step = h
+   end subroutine accept
+
+   subroutine swap(a, b)
+      real(wp), allocatable, intent(inout) :: a(:), b(:)
+      real(wp), allocatable :: c(:)
+      call move_alloc(a, c)
+      call move_alloc(b, a)
+      call move_alloc(c, b)
+   end subroutine swap
+
+   !> Rates at (t, y), counted and checked.
+   subroutine evaluate(self, t, y, f, ok)
+      class(dop853_integrator), intent(inout) :: self
+      real(wp), intent(in) :: t
+      real(wp), contiguous, intent(in) :: y(:)
+      real(wp), contiguous, intent(out) :: f(:)
+      logical, intent(out) :: ok
+      call self%system%rhs(t, y, f, ok)
+      self%counts%n_rhs = self%counts%n_rhs + 1
+      if (ok) ok = all(abs(f) <= huge(1.0_wp))
+   end subroutine evaluate
+
+   !> k_2..k_12 from k_1 = f.
+   subroutine stages(system, n, t, h, y, f, k, stage, ok)
+      class(ode_system), intent(inout) :: system
+      integer, intent(in) :: n
+      real(wp), intent(in) :: t, h
+      real(wp), intent(in) :: y(n), f(n)
+      real(wp), intent(inout) :: k(n, n_stages), stage(n)
+      logical, intent(out) :: ok
+
+      k(:, 1) = f
+      stage = y + h*(a2_1*k(:, 1))
+      call system%rhs(t + c2*h, stage, k(:, 2), ok)
+      if (.not. ok) return
+      stage = y + h*(a3_1*k(:, 1) + a3_2*k(:, 2))
+      call system%rhs(t + c3*h, stage, k(:, 3), ok)
+      if (.not. ok) return
+      stage = y + h*(a4_1*k(:, 1) + a4_3*k(:, 3))
+      call system%rhs(t + c4*h, stage, k(:, 4), ok)
+      if (.not. ok) return
+      stage = y + h*(a5_1*k(:, 1) + a5_3*k(:, 3) + a5_4*k(:, 4))
+      call system%rhs(t + c5*h, stage, k(:, 5), ok)
+      if (.not. ok) return
+      stage = y + h*(a6_1*k(:, 1) + a6_4*k(:, 4) + a6_5*k(:, 5))
+      call system%rhs(t + c6*h, stage, k(:, 6), ok)
+      if (.not. ok) return
+      stage = y + h*(a7_1*k(:, 1) + a7_4*k(:, 4) + a7_5*k(:, 5) + a7_6*k(:, 6))
+      call system%rhs(t + c7*h, stage, k(:, 7), ok)
+      if (.not. ok) return
+      stage = y + h*(a8_1*k(:, 1) + a8_4*k(:, 4) + a8_5*k(:, 5) + a8_6*k(:, 6) + a8_7*k(:, 7))
+      call system%rhs(t + c8*h, stage, k(:, 8), ok)
+      if (.not. ok) return
+      stage = y + h*(a9_1*k(:, 1) + a9_4*k(:, 4) + a9_5*k(:, 5) + a9_6*k(:, 6) + a9_7*k(:, 7) + &
+                       a9_8*k(:, 8))
+      call system%rhs(t + c9*h, stage, k(:, 9), ok)
+      if (.not. ok) return
+      stage = y + h*(a10_1*k(:, 1) + a10_4*k(:, 4) + a10_5*k(:, 5) + a10_6*k(:, 6) + a10_7*k(:, 7) + &
+                       a10_8*k(:, 8) + a10_9*k(:, 9))
+      call system%rhs(t + c10*h, stage, k(:, 10), ok)
+      if (.not. ok) return
+      stage = y + h*(a11_1*k(:, 1) + a11_4*k(:, 4) + a11_5*k(:, 5) + a11_6*k(:, 6) + a11_7*k(:, 7) + &
+                       a11_8*k(:, 8) + a11_9*k(:, 9) + a11_10*k(:, 10))
+      call system%rhs(t + c11*h, stage, k(:, 11), ok)
+      if (.not. ok) return
+      stage = y + h*(a12_1*k(:, 1) + a12_4*k(:, 4) + a12_5*k(:, 5) + a12_6*k(:, 6) + a12_7*k(:, 7) + &
+                       a12_8*k(:, 8) + a12_9*k(:, 9) + a12_10*k(:, 10) + a12_11*k(:, 11))
+      call system%rhs(t + c12*h, stage, k(:, 12), ok)
+      if (.not. ok) return
+   end subroutine stages
+
+   !> h sum b_i k_i.
+   pure subroutine add_increment(n, h, k, increment)
+      integer, intent(in) :: n
+      real(wp), intent(in) :: h
+      real(wp), intent(in) :: k(n, n_stages)
+      real(wp), intent(out) :: increment(n)
+      increment = h*(b1*k(:, 1) + b6*k(:, 6) + b7*k(:, 7) + b8*k(:, 8) + b9*k(:, 9) + b10*k(:, 10) + &
+                      b11*k(:, 11) + b12*k(:, 12))
+   end subroutine add_increment
+
+   !> Root mean square of error/tolerance over the controlled states; Hairer's mix of the two estimates.
+   pure real(wp) function error_norm(n, h, k, y, y_new, rtol, atol)
+      integer, intent(in) :: n
+      real(wp), intent(in) :: h
+      real(wp), intent(in) :: k(:, :)
+      real(wp), intent(in) :: y(n), y_new(n)
+      real(wp), intent(in) :: rtol, atol
+      real(wp) :: sum_5, sum_3, weight, e5, e3
+      integer :: i
+
+      sum_5 = 0.0_wp
+      sum_3 = 0.0_wp
+      do i = 1, n
+         weight = 1.0_wp/(atol + rtol*max(abs(y(i)), abs(y_new(i))))
+         e5 = e5_1*k(i, 1) + e5_6*k(i, 6) + e5_7*k(i, 7) + e5_8*k(i, 8) + e5_9*k(i, 9) + &
+               e5_10*k(i, 10) + e5_11*k(i, 11) + e5_12*k(i, 12)
+         e3 = e3_1*k(i, 1) + e3_6*k(i, 6) + e3_7*k(i, 7) + e3_8*k(i, 8) + e3_9*k(i, 9) + &
+               e3_10*k(i, 10) + e3_11*k(i, 11) + e3_12*k(i, 12)
+         sum_5 = sum_5 + (e5*weight)**2
+         sum_3 = sum_3 + (e3*weight)**2
+      end do
+      error_norm = 0.0_wp
+      if (sum_5 + sum_3 > 0.0_wp) error_norm = abs(h)*sum_5/sqrt(n*(sum_5 + 0.01_wp*sum_3))
+   end function error_norm
+
+   !> Length of the first step (Hairer, Norsett & Wanner, sec. II.4).
+   subroutine first_step(self, error)
+      class(dop853_integrator), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: d0, d1, d2, h0, h1
+      logical :: ok
+
+      associate (n => self%system%n_controlled, span => self%t_stop - self%t)
+         if (span <= 0.0_wp) return
+         self%stage(:) = self%options%atol + self%options%rtol*abs(self%y)
+         d0 = norm2(self%y(:n)/self%stage(:n))/sqrt(real(n, wp))
+         d1 = norm2(self%f(:n)/self%stage(:n))/sqrt(real(n, wp))
+         h0 = 1.0e-6_wp
+         if (min(d0, d1) > 1.0e-5_wp) h0 = 0.01_wp*d0/d1
+         h0 = min(h0, span)
+         self%y_new(:) = self%y + h0*self%f
+         call evaluate(self, self%t + h0, self%y_new, self%increment, ok)
+         if (ok) then
+            d2 = norm2((self%increment(:n) - self%f(:n))/self%stage(:n))/sqrt(real(n, wp))/h0
+            if (max(d1, d2) <= 1.0e-15_wp) then
+               h1 = max(1.0e-6_wp, 1.0e-3_wp*h0)
+            else
+               h1 = (0.01_wp/max(d1, d2))**0.125_wp
+            end if
+            self%h = min(100.0_wp*h0, h1, span)
+         else
+            self%h = 1.0e-3_wp*h0
+         end if
+         if (self%options%max_step > 0.0_wp) self%h = min(self%h, self%options%max_step)
+         if (.not. self%h > 0.0_wp) call raise(error, 'dop853 at t = '//time_text(self%t)//' s: no first step found')
+      end associate
+   end subroutine first_step
+
+   !> Counts over the whole run.
+   function statistics(self) result(stats)
+      class(dop853_integrator), intent(inout) :: self
+      type(solver_statistics) :: stats
+      stats = self%counts
+      stats%n_steps = self%n_steps
+      stats%n_starts = self%n_starts
+   end function statistics
+
+   !> Nothing is held outside Fortran.
+   subroutine finalize(self)
+      class(dop853_integrator), intent(inout) :: self
+      nullify (self%system, self%monitor)
+   end subroutine finalize
+
+end module rodyn_dop853_integrator
