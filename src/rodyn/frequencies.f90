@@ -1,4 +1,5 @@
-!> Small-motion natural frequencies of a scene about a configuration at rest: K x = w^2 M x by LAPACK.
+!> Small motions of a scene about a configuration at rest, by LAPACK: natural frequencies K x = w^2 M x, and how
+!> fast its dampers act alone, D x = lambda M x.
 module rodyn_frequencies
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type, raise
@@ -7,7 +8,7 @@ module rodyn_frequencies
    use rodyn_lapack, only: dsygvd
    implicit none (type, external)
    private
-   public :: natural_frequencies
+   public :: natural_frequencies, decay_rates
 
 contains
 
@@ -18,29 +19,53 @@ contains
       real(wp), allocatable, intent(out) :: frequency(:) !! (dof) [rad/s]
       type(error_type), allocatable, intent(out) :: error
       type(assembled_system) :: system
-      real(wp), allocatable :: work(:)
+
+      call new_assembled_system(system, scene, error)
+      if (allocated(error)) return
+      call eigenvalues(scene, q, system, system%k, frequency, error)
+      if (allocated(error)) return
+      frequency = sqrt(max(frequency, 0.0_wp))
+   end subroutine natural_frequencies
+
+   !> Rates of decay if nothing but the dampers acted, rising: 2 zeta w of a lightly damped mode, and the stiff
+   !> end of the spectrum when the dampers are strong.
+   subroutine decay_rates(scene, q, rate, error)
+      type(scene_type), intent(in) :: scene
+      real(wp), intent(in) :: q(:)                  !! coordinates (dof)
+      real(wp), allocatable, intent(out) :: rate(:) !! (dof) [1/s]
+      type(error_type), allocatable, intent(out) :: error
+      type(assembled_system) :: system
+
+      call new_assembled_system(system, scene, error)
+      if (allocated(error)) return
+      call eigenvalues(scene, q, system, system%d, rate, error)
+   end subroutine decay_rates
+
+   !> Eigenvalues of A x = lambda M(q) x, rising; A is overwritten.
+   subroutine eigenvalues(scene, q, system, a, value, error)
+      type(scene_type), intent(in) :: scene
+      real(wp), intent(in) :: q(:)
+      type(assembled_system), intent(inout) :: system !! its M is used up
+      real(wp), intent(in) :: a(:, :)
+      real(wp), allocatable, intent(out) :: value(:)
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: work(:), matrix(:, :)
       integer, allocatable :: integer_work(:)
       real(wp) :: sine(0:scene%n), cosine(0:scene%n), work_size(1)
       integer :: info, m, integer_size(1)
 
       m = scene%n_dof
-      call new_assembled_system(system, scene, error)
-      if (allocated(error)) return
+      matrix = a
       sine(0) = 0.0_wp
       cosine(0) = 1.0_wp
       sine(1:) = sin(q(scene%phi_at() + 1:scene%phi_at() + scene%n))
       cosine(1:) = cos(q(scene%phi_at() + 1:scene%phi_at() + scene%n))
       call mass_matrix(system, scene, sine, cosine, q)
-      allocate (frequency(m))
-      call dsygvd(1, 'N', 'L', m, system%k, m, system%m, m, frequency, work_size, -1, integer_size, -1, info)
+      allocate (value(m))
+      call dsygvd(1, 'N', 'L', m, matrix, m, system%m, m, value, work_size, -1, integer_size, -1, info)
       allocate (work(int(work_size(1))), integer_work(integer_size(1)))
-      call dsygvd(1, 'N', 'L', m, system%k, m, system%m, m, frequency, work, size(work), integer_work, &
-                  size(integer_work), info)
-      if (info /= 0) then
-         call raise(error, 'dsygvd: no natural frequencies (mass matrix not positive definite, or no convergence)')
-         return
-      end if
-      frequency = sqrt(max(frequency, 0.0_wp))
-   end subroutine natural_frequencies
+      call dsygvd(1, 'N', 'L', m, matrix, m, system%m, m, value, work, size(work), integer_work, size(integer_work), info)
+      if (info /= 0) call raise(error, 'dsygvd: no eigenvalues (mass matrix not positive definite, or no convergence)')
+   end subroutine eigenvalues
 
 end module rodyn_frequencies
