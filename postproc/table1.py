@@ -52,7 +52,7 @@ def print_table(path: str) -> bool:
             "phi_4, rad": (run["phi"][:, 3], PHI_4),
             "alpha_1', rad/s": (run["alpha_rate"][:, 0], ALPHA_1_RATE),
         }
-        status = run.attrs["status"]
+        status = run.attrs["status"].decode()
     rows = {t: row_at(time, t) for t in PHI_4}
     if all(row is None for row in rows.values()):
         times = ", ".join(str(t) for t in PHI_4)
@@ -83,7 +83,7 @@ def main() -> int:
     try:
         agrees = print_table(arguments.run)
     except (OSError, KeyError, IndexError, ValueError) as error:
-        print(f"{arguments.run}: not a run of the table-1 scene: {error}", file=sys.stderr)
+        print(f"{arguments.run}: not a run of the table-1 scene that can be compared: {error}", file=sys.stderr)
         return 2
     return 1 if arguments.check and not agrees else 0
 
