@@ -56,7 +56,7 @@ contains
       case (4)
          config%model%inertia = 'lumped'
          config%model%bending = 'rigid'
-      case (5)
+      case default
          config%model%inertia = 'lumped'
          config%model%bending = 'quasistatic'
       end select

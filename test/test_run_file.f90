@@ -86,10 +86,12 @@ contains
       report%wall_seconds = 0.5_wp
    end function sample_report
 
+   !> A number that depends on all three. A square root of an integer is rounded exactly, and so the same to the last bit in
+   !> scalar and in vector code; a sine is not.
    pure function value(k, i, r)
       integer, intent(in) :: k, i, r
       real(wp) :: value
-      value = sin(0.001_wp*real(r, wp)*real(k, wp) + 0.1_wp*real(i, wp))
+      value = sqrt(real(r*k + 3*k + 100*i, wp))
    end function value
 
    subroutine fill(row, r)

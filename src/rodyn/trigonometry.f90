@@ -3,7 +3,8 @@
 !> The library functions are called one angle at a time and took more than half of a right-hand side. This is
 !> their classic algorithm without branches: reduction by multiples of pi/2 in three parts (Cody & Waite) that
 !> keeps the rounding error of the reduced angle, then the minimax polynomials of fdlibm (k_sin.c, k_cos.c,
-!> Sun Microsystems 1993), summed in pairs for speed. Error below 1 unit in the last place; angles beyond `largest` go to the library.
+!> Sun Microsystems 1993), summed in pairs for speed. Error below 1 unit in the last place; angles beyond
+!> `largest` go to the library.
 module rodyn_trigonometry
    use rodyn_kinds, only: wp, i8
    implicit none (type, external)
