@@ -5,6 +5,8 @@ program tester
    use test_case_keys, only: collect_case_keys
    use test_case_reader, only: collect_case_reader
    use test_case_rules, only: collect_case_rules
+   use test_beams, only: collect_beams
+   use test_invariants, only: collect_invariants
    use test_hdf5_files, only: collect_hdf5_files
    use test_integrators, only: collect_integrators
    use test_kernels, only: collect_kernels
@@ -47,6 +49,8 @@ program tester
    call run('hdf5_files', collect_hdf5_files)
    call run('run_file', collect_run_file)
    call run('article', collect_article)
+   call run('invariants', collect_invariants)
+   call run('beams', collect_beams)
 
    write (*, '(i0, " passed, ", i0, " failed")') tally%passed, tally%failed
    if (tally%failed > 0 .or. tally%passed == 0) stop 1, quiet=.true.

@@ -620,7 +620,7 @@ contains
       type(solver_options) :: options
       class(integrator_type), allocatable :: integrator
       type(error_type), allocatable :: failure
-      character(len=5), parameter :: calls(3) = [character(len=5) :: 'CVode', 'CVode', 'ERKSt']
+      character(len=5), parameter :: calls(4) = [character(len=5) :: 'CVode', 'CVode', 'ERKSt', 'dop85']
       real(wp) :: y(2), t
       integer :: i
 

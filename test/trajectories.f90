@@ -26,7 +26,7 @@ module test_trajectories
 
 contains
 
-   !> Integrate a case by its method ('auto' is Adams here) and keep the states at `times`.
+   !> Integrate a case by its method ('auto' is dop853 here) and keep the states at `times`.
    subroutine integrate(config, times, result, error)
       type(case_config), intent(in) :: config
       real(wp), intent(in) :: times(:)          !! increasing; the last one is the end [s]
@@ -37,6 +37,7 @@ contains
       class(integrator_type), allocatable :: integrator
       type(solver_options) :: options
       real(wp), allocatable :: y(:)
+      character(len=:), allocatable :: method
       real(wp) :: t
       integer :: i
 
@@ -48,8 +49,9 @@ contains
       options%atol = config%solver%atol
       options%order = config%solver%order
       options%fixed_step = config%solver%fixed_step
-      call new_integrator(integrator, motion, trim(merge('adams', config%solver%method(:5), &
-                                                         config%solver%method == 'auto')), options, error)
+      method = trim(config%solver%method)
+      if (method == 'auto') method = 'dop853'
+      call new_integrator(integrator, motion, method, options, error)
       if (allocated(error)) return
       allocate (result%rows(size(times)))
       do i = 1, size(times)

@@ -5,6 +5,7 @@
 !> the article joins the last two for uniform rods, where int m Na = -int m Nb. On a fixed spacecraft the first
 !> three rows and columns are absent. For massless rods all rod integrals are zero.
 module rodyn_assembled
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type, raise
    use rodyn_scene, only: scene_type
@@ -157,7 +158,7 @@ contains
       ok = info == 0
       if (.not. ok) return
       call dpotrs('L', n_dof, 1, system%m, n_dof, acceleration, n_dof, info)
-      ok = info == 0 .and. all(abs(acceleration) <= huge(1.0_wp))
+      ok = info == 0 .and. all(ieee_is_finite(acceleration))
    end subroutine assembled_accelerations
 
    !> z of the article for the rates p.

@@ -6,11 +6,17 @@
 !> than one. Outputs inside a step are computed by one shorter step from its start, as accurate as the steps
 !> themselves, so they never change the steps.
 module rodyn_dop853_integrator
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type, raise
    use rodyn_ode, only: ode_system
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, time_text
-   use rodyn_dop853_tableau
+   use rodyn_dop853_tableau, only: c2, c3, c4, c5, c6, c7, c8, c9, c10, c11, c12, a2_1, a3_1, a3_2, a4_1, &
+      a4_3, a5_1, a5_3, a5_4, a6_1, a6_4, a6_5, a7_1, a7_4, a7_5, a7_6, a8_1, a8_4, a8_5, a8_6, a8_7, a9_1, &
+      a9_4, a9_5, a9_6, a9_7, a9_8, a10_1, a10_4, a10_5, a10_6, a10_7, a10_8, a10_9, a11_1, a11_4, a11_5, &
+      a11_6, a11_7, a11_8, a11_9, a11_10, a12_1, a12_4, a12_5, a12_6, a12_7, a12_8, a12_9, a12_10, a12_11, &
+      b1, b6, b7, b8, b9, b10, b11, b12, e5_1, e5_6, e5_7, e5_8, e5_9, e5_10, e5_11, e5_12, e3_1, e3_6, e3_7, &
+      e3_8, e3_9, e3_10, e3_11, e3_12
    implicit none (type, external)
    private
    public :: dop853_integrator, new_dop853_integrator
@@ -31,6 +37,7 @@ module rodyn_dop853_integrator
       real(wp), allocatable :: stage(:), increment(:), y_new(:) !! workspace
       real(wp) :: t_first = 0.0_wp       !! start of the interval, where the grid of fixed steps begins [s]
       integer(i8) :: n_grid = 0, i_grid = 0 !! fixed steps of the interval; steps done
+      logical :: refused = .false.       !! the last bad try failed because the right-hand side said so
       type(solver_statistics) :: counts
    contains
       procedure :: start
@@ -83,7 +90,7 @@ contains
       self%n_grid = 0
       call evaluate(self, t, self%y, self%f, ok)
       if (.not. ok) then
-         call raise(error, 'dop853 at t = '//time_text(t)//' s: the right-hand side cannot be evaluated')
+         call raise(error, 'dop853 at t = '//time_text(t)//' s: '//trouble(self))
          return
       end if
       if (self%options%fixed_step > 0.0_wp) then
@@ -136,24 +143,26 @@ contains
          if (allocated(error)) return
          call choose_end(self, h, t_new)
          if (h <= 4.0_wp*spacing(self%t)) then
-            call raise(error, 'dop853 at t = '//time_text(self%t)//' s: the step size fell below rounding error')
+            call raise(error, 'dop853 at t = '//time_text(self%t)//' s: '//trouble(self))
             return
          end if
          call stages(self%system, size(self%y), self%t, h, self%y, self%f, self%k, self%stage, ok)
          self%counts%n_rhs = self%counts%n_rhs + n_stages - 1
+         self%refused = .not. ok
          if (ok) then
             call add_increment(size(self%y), h, self%k, self%increment)
             self%y_new(:) = self%y + (self%increment - self%lost)
+            ok = all(ieee_is_finite(self%y_new))
             norm = 0.0_wp
-            if (self%n_grid == 0) norm = error_norm(self%system%n_controlled, h, self%k(:self%system%n_controlled, :), &
+            if (ok .and. self%n_grid == 0) norm = error_norm(self%system%n_controlled, h, self%k(:self%system%n_controlled, :), &
                                                     self%y, self%y_new, self%options%rtol, self%options%atol)
-            if (norm <= 1.0_wp) call evaluate(self, t_new, self%y_new, self%stage, ok)
+            if (ok .and. norm <= 1.0_wp) call evaluate(self, t_new, self%y_new, self%stage, ok)
          end if
          if (.not. ok) norm = huge(1.0_wp) ! not finite: shorten by the most
-         if (.not. norm <= huge(1.0_wp)) norm = huge(1.0_wp)
+         if (.not. ieee_is_finite(norm)) norm = huge(1.0_wp)
          if (norm <= 1.0_wp) exit
          if (self%n_grid > 0) then
-            call raise(error, 'dop853 at t = '//time_text(self%t)//' s: the state is no longer finite')
+            call raise(error, 'dop853 at t = '//time_text(self%t)//' s: '//trouble(self))
             return
          end if
          self%counts%n_error_test_failures = self%counts%n_error_test_failures + 1
@@ -229,8 +238,20 @@ contains
       logical, intent(out) :: ok
       call self%system%rhs(t, y, f, ok)
       self%counts%n_rhs = self%counts%n_rhs + 1
-      if (ok) ok = all(abs(f) <= huge(1.0_wp))
+      self%refused = .not. ok
+      if (ok) ok = all(ieee_is_finite(f))
    end subroutine evaluate
+
+   !> What stands in the way of a step.
+   function trouble(self) result(text)
+      class(dop853_integrator), intent(in) :: self
+      character(len=:), allocatable :: text
+      if (self%refused) then
+         text = 'the right-hand side could not be evaluated (mass matrix not positive definite, or not finite)'
+      else
+         text = 'the right-hand side was not finite, or no step is small enough'
+      end if
+   end function trouble
 
    !> k_2..k_12 from k_1 = f.
    subroutine stages(system, n, t, h, y, f, k, stage, ok)

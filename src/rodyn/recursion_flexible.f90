@@ -10,6 +10,7 @@
 !> the rod's. Here the products are multiplied out, so that the large terms cancel on paper; the determinant of
 !> P, which does not depend on the axes, is carried along for the one difference (pee pnn - pen^2) that is left.
 module rodyn_recursion_flexible
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp
    use rodyn_rod_constants, only: rod_constants
    use rodyn_spacecraft, only: spacecraft_body, spacecraft_accelerations
@@ -36,12 +37,12 @@ contains
       real(wp), intent(in) :: node_force(2, *)      !! X, Y at nodes (n), moving axes [N]
       real(wp), intent(out) :: outward(8, n)        !! workspace
       real(wp), intent(out) :: acceleration(n_base + 3*n) !! p'
-      logical, intent(out) :: ok                    !! false: not finite
+      logical, intent(out) :: ok                    !! false: not finite, or M not positive definite (large deflections in `paper`)
 
       integer :: k, ip, ia, ib
       real(wp) :: omega, omega_rate, w, w2, lw2, w_rate, alpha, beta, qa, qb
       real(wp) :: mv, mv_rate, mvv, mvv_rate, d, outer, central, r0, gq, hq
-      real(wp) :: pee, pen, pnn, det, be, bn, mu, inv, ce, cn, r, ee, en, nn, cd, sd, ae, an
+      real(wp) :: pee, pen, pnn, det, be, bn, mu, inv, ce, cn, r, ee, en, nn, cd, sd, ae, an, smallest
 
       ip = n_base
       ia = n_base + n
@@ -54,6 +55,7 @@ contains
       det = 0.0_wp
       be = 0.0_wp
       bn = 0.0_wp
+      smallest = huge(1.0_wp)
 
       inward: do k = n, 1, -1
          associate (rod => rods(rod_of(k)), i => rods(rod_of(k))%inertia)
@@ -93,7 +95,9 @@ contains
             d = rod%m2_reduced + mvv
             outer = rod%outer + mvv
             central = rod%central + rod%m0_reduced*mvv
-            inv = 1.0_wp/(d + rod%length**2*pnn)
+            inv = d + rod%length**2*pnn
+            smallest = min(smallest, inv)
+            inv = 1.0_wp/inv
             ce = rod%length*pen - mv
             cn = rod%m1_reduced + rod%length*pnn
             be = be - pee*lw2
@@ -150,7 +154,7 @@ contains
             an = an + length*w_rate
          end associate
       end do
-      ok = abs(an) <= huge(an)
+      ok = ieee_is_finite(an) .and. smallest > 0.0_wp
    end subroutine flexible_accelerations
 
 end module rodyn_recursion_flexible

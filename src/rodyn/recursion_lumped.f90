@@ -5,6 +5,7 @@
 !>     a = mu (mu + a_out)/(mu + a_out sin^2(delta)),
 !> delta the angle from rod k to rod k + 1 and mu the mass between them: no differences, no loss of digits.
 module rodyn_recursion_lumped
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp
    use rodyn_rod_constants, only: rod_constants
    use rodyn_spacecraft, only: spacecraft_body, spacecraft_accelerations
@@ -87,7 +88,7 @@ contains
          acceleration(n_base + k) = (outer_an - an)/rods(rod_of(k))%length - omega_rate
          an = outer_an
       end do
-      ok = abs(an) <= huge(an)
+      ok = ieee_is_finite(an)
    end subroutine lumped_accelerations
 
 end module rodyn_recursion_lumped

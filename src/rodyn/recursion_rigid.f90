@@ -3,6 +3,7 @@
 !> The recursion of `rodyn_recursion_flexible` with v = 0; see there for the notation and for why the products
 !> are multiplied out.
 module rodyn_recursion_rigid
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp
    use rodyn_rod_constants, only: rod_constants
    use rodyn_spacecraft, only: spacecraft_body, spacecraft_accelerations
@@ -107,7 +108,7 @@ contains
          ae = ae - outward(4, k)
          an = an + rods(rod_of(k))%length*w_rate
       end do
-      ok = abs(an) <= huge(an)
+      ok = ieee_is_finite(an)
    end subroutine rigid_accelerations
 
 end module rodyn_recursion_rigid
