@@ -148,8 +148,8 @@ contains
       call seed_random(13)
       do which = 1, n_kinds
          call random_case(config, which, 3)
-         config%solver%rtol = 1.0e-11_wp
-         config%solver%atol = 1.0e-12_wp
+         config%solver%rtol = 1.0e-13_wp
+         config%solver%atol = 1.0e-14_wp
          config%loads%law = 'constant'
          config%chain%bending_stiffness = 100.0_wp*config%chain%bending_stiffness ! `paper` bears small deflections only
          turned = config
