@@ -64,27 +64,34 @@ contains
       end if
    end subroutine hinge_moments
 
-   !> T = C (opening - gamma) + D opening' between rods that bend.
+   !> T = C (opening - gamma) + D opening' between rods that bend. One pass: the tangent at the outer end of
+   !> rod k, (phi + beta)_k, is kept for the next hinge.
    pure subroutine flexible_moments(n, stiffness, damping, kink, damped, kinked, angle, angle_rate, moment)
       integer, intent(in) :: n
       real(wp), intent(in) :: stiffness(0:n - 1), damping(0:n - 1), kink(0:n - 1)
       logical, intent(in) :: damped, kinked
       real(wp), intent(in) :: angle(n, 3), angle_rate(n, 3) !! phi, alpha, beta and rates
       real(wp), intent(out) :: moment(0:n)
+      real(wp) :: outer, outer_rate
       integer :: k
 
-      moment(0) = stiffness(0)*(angle(1, 1) + angle(1, 2))
-      do k = 1, n - 1
-         moment(k) = stiffness(k)*((angle(k + 1, 1) + angle(k + 1, 2)) - (angle(k, 1) + angle(k, 3)))
-      end do
+      outer = 0.0_wp
+      outer_rate = 0.0_wp
+      if (damped) then
+         do k = 1, n
+            moment(k - 1) = stiffness(k - 1)*((angle(k, 1) + angle(k, 2)) - outer) + &
+                            damping(k - 1)*((angle_rate(k, 1) + angle_rate(k, 2)) - outer_rate)
+            outer = angle(k, 1) + angle(k, 3)
+            outer_rate = angle_rate(k, 1) + angle_rate(k, 3)
+         end do
+      else
+         do k = 1, n
+            moment(k - 1) = stiffness(k - 1)*((angle(k, 1) + angle(k, 2)) - outer)
+            outer = angle(k, 1) + angle(k, 3)
+         end do
+      end if
       moment(n) = 0.0_wp
       if (kinked) moment(0:n - 1) = moment(0:n - 1) - stiffness*kink
-      if (.not. damped) return
-      moment(0) = moment(0) + damping(0)*(angle_rate(1, 1) + angle_rate(1, 2))
-      do k = 1, n - 1
-         moment(k) = moment(k) + damping(k)*((angle_rate(k + 1, 1) + angle_rate(k + 1, 2)) - &
-                                             (angle_rate(k, 1) + angle_rate(k, 3)))
-      end do
    end subroutine flexible_moments
 
    !> The same between rigid rods.
