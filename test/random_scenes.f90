@@ -6,7 +6,7 @@ module test_random_scenes
    private
    public :: random_case, seed_random, uniform, kind_name, n_kinds, allocate_case
 
-   integer, parameter :: n_kinds = 12 !! 6 models on a free and on a fixed spacecraft
+   integer, parameter :: n_kinds = 14 !! 7 models on a free and on a fixed spacecraft
 
 contains
 
@@ -35,7 +35,7 @@ contains
       type(case_config) :: config
       call set_kind(config, which)
       name = trim(config%model%formulation)//' '//trim(config%model%inertia)//' '// &
-             trim(config%model%bending)//' '//trim(config%spacecraft%motion)
+             trim(config%model%bending)//' '//trim(config%model%dampers)//' '//trim(config%spacecraft%motion)
    end function kind_name
 
    !> Choose the model: 1..n_kinds.
@@ -56,9 +56,13 @@ contains
       case (4)
          config%model%inertia = 'lumped'
          config%model%bending = 'rigid'
+      case (5)
+         config%model%inertia = 'lumped'
+         config%model%bending = 'quasistatic'
       case default
          config%model%inertia = 'lumped'
          config%model%bending = 'quasistatic'
+         config%model%dampers = 'exact'
       end select
    end subroutine set_kind
 
@@ -93,7 +97,7 @@ contains
          config%chain%bending_stiffness(k) = 10.0_wp**uniform(2.0_wp, 4.0_wp)
          config%chain%node_mass(k) = max(0.0_wp, uniform(-1.0_wp, 2.0_wp))
          config%chain%hinge_stiffness(k - 1) = max(0.0_wp, uniform(-500.0_wp, 5000.0_wp))
-         if (mod(which + n, 2) == 0) config%chain%hinge_damping(k - 1) = uniform(0.0_wp, 2.0_wp)
+         if (mod(which + n, 2) == 0) config%chain%hinge_damping(k - 1) = max(0.0_wp, uniform(-0.5_wp, 2.0_wp))
          if (mod(n, 3) == 0) config%chain%kink(k - 1) = uniform(-0.5_wp, 0.5_wp)
       end do
       if (n > 1) config%chain%length(2) = config%chain%length(1) ! not quite distinct rods

@@ -4,7 +4,7 @@ module test_kernels
    use rodyn_errors, only: error_type, raise
    use rodyn_case_config, only: case_config
    use rodyn_scene, only: scene_type, new_scene
-   use rodyn_accelerations, only: dynamics_type, new_dynamics
+   use rodyn_motion, only: motion_type, new_motion, initial_state
    use test_testing, only: unittest, new_test
    use test_random_scenes, only: random_case, seed_random, kind_name, n_kinds
    implicit none (type, external)
@@ -51,31 +51,19 @@ contains
       real(wp), allocatable, intent(out) :: acceleration(:)
       type(error_type), allocatable, intent(out) :: error
       type(scene_type) :: scene
-      type(dynamics_type) :: dynamics
-      real(wp), allocatable :: q(:), p(:)
+      type(motion_type) :: motion
+      real(wp), allocatable :: y(:)
       logical :: ok
 
       config%model%kernel = kernel
       call new_scene(scene, config, error)
+      if (.not. allocated(error)) call new_motion(motion, scene, .false., error)
       if (allocated(error)) return
-      call new_dynamics(dynamics, scene, error)
-      if (allocated(error)) return
-      call dynamics%set_regime(0.0_wp, 1.0_wp)
-      associate (start => config%initial)
-         if (scene%n_base > 0) then
-            q = [start%displacement_x, start%displacement_y, start%rotation, start%phi]
-            p = [start%velocity_x, start%velocity_y, start%omega, start%phi_rate]
-         else
-            q = start%phi
-            p = start%phi_rate
-         end if
-         if (scene%dynamic_bending) then
-            q = [q, start%alpha, start%beta]
-            p = [p, start%alpha_rate, start%beta_rate]
-         end if
-      end associate
-      allocate (acceleration(scene%n_dof))
-      call dynamics%accelerations(0.3_wp, q, p, acceleration, ok)
+      call motion%dynamics%set_regime(0.0_wp, 1.0_wp)
+      call initial_state(motion, config%initial, y)
+      if (motion%n_q > motion%n_dof) y(motion%n_dof + 1:motion%n_q) = 1.1_wp*y(motion%n_dof + 1:motion%n_q)
+      allocate (acceleration(size(y)))
+      call motion%rhs(0.3_wp, y, acceleration, ok)
       if (.not. ok) call raise(error, kernel//' kernel failed')
    end subroutine accelerations_by
 

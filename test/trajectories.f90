@@ -4,8 +4,8 @@ module test_trajectories
    use rodyn_errors, only: error_type
    use rodyn_case_config, only: case_config
    use rodyn_scene, only: scene_type, new_scene
-   use rodyn_motion, only: motion_type, new_motion, initial_state
-   use rodyn_kinematics, only: invariants_type, invariants
+   use rodyn_motion, only: motion_type, new_motion, initial_state, state_invariants
+   use rodyn_kinematics, only: invariants_type
    use rodyn_ledger, only: fill_row
    use rodyn_run_file, only: run_row, new_run_row
    use rodyn_integrator, only: integrator_type, solver_options
@@ -70,7 +70,7 @@ contains
       type(invariants_type) :: start
 
       if (self%n_rows == 0) then
-         start = invariants(motion%dynamics%scene, y(:motion%n_dof), y(motion%n_dof + 1:2*motion%n_dof))
+         start = state_invariants(motion, y)
          self%initial_energy = start%kinetic + start%elastic
       end if
       self%n_rows = self%n_rows + 1

@@ -25,6 +25,7 @@ module rodyn_accelerations
       type(load_regime) :: regime      !! loads between the last switch and the next
       type(load_forces) :: forces      !! their values
       integer :: path = path_flexible  !! which kernel
+      logical :: needs_moments = .true. !! the kernel does not form them itself
       logical :: varying = .false.     !! some load changes within the regime
    contains
       procedure :: set_regime
@@ -44,6 +45,7 @@ contains
       allocate (dynamics%forces%node(2, 0))
       if (scene%assembled) then
          dynamics%path = path_assembled
+         dynamics%needs_moments = size(scene%hinges%relaxing) > 0
          call new_assembled_system(dynamics%system, scene, error)
       else if (scene%lumped) then
          dynamics%path = path_lumped
@@ -68,7 +70,7 @@ contains
    subroutine accelerations(self, t, q, p, acceleration, ok)
       class(dynamics_type), intent(inout) :: self
       real(wp), intent(in) :: t                !! [s], within the regime
-      real(wp), intent(in) :: q(self%scene%n_dof)             !! coordinates
+      real(wp), intent(in) :: q(self%scene%n_q)               !! coordinates
       real(wp), intent(in) :: p(self%scene%n_dof)             !! rates
       real(wp), intent(out) :: acceleration(self%scene%n_dof) !! p'
       logical, intent(out) :: ok               !! false: not finite, or M not positive definite
@@ -76,7 +78,7 @@ contains
       associate (scene => self%scene, work => self%work, first => self%scene%n_base + 1)
          if (self%varying) call evaluate_loads(self%forces, self%regime, t, fresh=.false.)
          call sine_cosine(scene%n, q(first), work%sine(1:), work%cosine(1:))
-         if (self%path /= path_assembled) &
+         if (self%needs_moments) &
             call hinge_moments(scene%hinges, scene%n, scene%dynamic_bending, q(first), p(first), work%theta, work%moment)
          select case (self%path)
          case (path_flexible)
@@ -92,7 +94,7 @@ contains
                                       work%sine, work%cosine, p, work%moment, self%forces%base, &
                                       self%regime%on_nodes, self%forces%node, work%outward, acceleration, ok)
          case default
-            call assembled_accelerations(self%system, scene, work%sine, work%cosine, q, p, self%forces%base, &
+            call assembled_accelerations(self%system, scene, work%sine, work%cosine, q, p, work%moment, self%forces%base, &
                                          self%regime%on_nodes, self%forces%node, acceleration, ok)
          end select
       end associate

@@ -130,12 +130,13 @@ contains
    end subroutine add_bending
 
    !> p' from M p' = Q1 + Q2 - N z - D p - K q by Cholesky.
-   subroutine assembled_accelerations(system, scene, sine, cosine, q, p, base_force, loaded, node_force, &
+   subroutine assembled_accelerations(system, scene, sine, cosine, q, p, moment, base_force, loaded, node_force, &
                                       acceleration, ok)
       type(assembled_system), intent(inout) :: system
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: sine(0:), cosine(0:) !! of phi (0:n)
       real(wp), intent(in) :: q(:), p(:)           !! coordinates and rates (dof)
+      real(wp), intent(in) :: moment(0:)           !! hinge moments (0:n), used if hinges relax: T is then no K q + D p
       real(wp), intent(in) :: base_force(3)        !! X_C, Y_C, M_C
       logical, intent(in) :: loaded                !! node_force is to be used
       real(wp), intent(in) :: node_force(2, *)     !! X, Y at the nodes [N]
@@ -150,10 +151,16 @@ contains
       acceleration = 0.0_wp
       if (scene%n_base > 0) acceleration(1:3) = base_force
       if (loaded) call add_node_forces(scene, sine, cosine, node_force, acceleration)
-      if (system%kinked) acceleration = acceleration + system%q2
       call dgemv('N', n_dof, n_dof, -1.0_wp, system%n, n_dof, system%z, 1, 1.0_wp, acceleration, 1)
-      call dgemv('N', n_dof, n_dof, -1.0_wp, system%k, n_dof, q, 1, 1.0_wp, acceleration, 1)
-      if (system%damped) call dgemv('N', n_dof, n_dof, -1.0_wp, system%d, n_dof, p, 1, 1.0_wp, acceleration, 1)
+      if (size(scene%hinges%relaxing) > 0) then
+         associate (first => scene%phi_at() + 1, n => scene%n)
+            acceleration(first:) = acceleration(first:) + moment(1:n) - moment(0:n - 1)
+         end associate
+      else
+         if (system%kinked) acceleration = acceleration + system%q2
+         call dgemv('N', n_dof, n_dof, -1.0_wp, system%k, n_dof, q, 1, 1.0_wp, acceleration, 1)
+         if (system%damped) call dgemv('N', n_dof, n_dof, -1.0_wp, system%d, n_dof, p, 1, 1.0_wp, acceleration, 1)
+      end if
       call dpotrf('L', n_dof, system%m, n_dof, info)
       ok = info == 0
       if (.not. ok) return

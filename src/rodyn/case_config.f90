@@ -40,6 +40,7 @@ module rodyn_case_config
       character(len=name_length) :: formulation = 'consistent' !! 'consistent' or 'paper'
       character(len=name_length) :: inertia = 'distributed'    !! 'distributed' or 'lumped'
       character(len=name_length) :: bending = 'dynamic'        !! 'dynamic', 'quasistatic' or 'rigid'
+      character(len=name_length) :: dampers = 'reduced'        !! 'reduced' or 'exact', matters when quasistatic
       integer :: gauss_points = 4                              !! points of the rule for the rod integrals
       character(len=name_length) :: kernel = 'recursive'       !! 'recursive' or 'assembled'
    end type model_config

@@ -65,6 +65,7 @@ contains
       call visitor%word_field('formulation', model%formulation)
       call visitor%word_field('inertia', model%inertia)
       call visitor%word_field('bending', model%bending)
+      call visitor%word_field('dampers', model%dampers)
       call visitor%field('gauss_points', model%gauss_points)
       call visitor%word_field('kernel', model%kernel)
       call visitor%close_group()

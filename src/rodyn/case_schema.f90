@@ -59,6 +59,8 @@ module rodyn_case_schema
          help='mass along the rods, or half of it at each of their ends'), &
       schema_row('model', 'bending', type_word, default="'dynamic'", words='dynamic|quasistatic|rigid', &
          help="dynamic needs inertia = 'distributed', quasistatic needs 'lumped'"), &
+      schema_row('model', 'dampers', type_word, default="'reduced'", words='reduced|exact', &
+         help='of quasistatic bending: reduced is accurate to (D w/C)^2, exact adds a state per damped hinge'), &
       schema_row('model', 'gauss_points', type_integer, default='4', rule=in_range, low=1.0_wp, high=200.0_wp, &
          help='points of the quadrature rule for the rod integrals'), &
       schema_row('model', 'kernel', type_word, default="'recursive'", words='recursive|assembled', &

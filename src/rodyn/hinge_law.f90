@@ -2,14 +2,16 @@
 !>
 !> With joint rotation th and its rate, T = C th + D th'. When bending is quasistatic the rods are springs in
 !> series with the hinges, and the joint rotations follow from one constant tridiagonal system (see
-!> `rodyn_three_moments`).
+!> `rodyn_three_moments`). Dampers in such a series are treated in one of two ways:
+!> - `reduced`: rates follow from the same system as rotations, accurate to (D w/C)^2;
+!> - `exact`: the rotation of each damped hinge is a state of its own, th' = (T - C th)/D, behind phi in q.
 module rodyn_hinge_law
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: chain_config
    use rodyn_three_moments, only: three_moments, new_three_moments
    implicit none (type, external)
    private
-   public :: hinge_law, new_hinge_law, hinge_moments, hinge_state, hinge_tangent
+   public :: hinge_law, new_hinge_law, hinge_moments, hinge_state, hinge_tangent, relaxation_rates, initial_joints
 
    !> Springs, dampers and kinks of hinges 0..n-1.
    type :: hinge_law
@@ -21,15 +23,21 @@ module rodyn_hinge_law
       logical :: has_kinks = .false.        !! some gamma /= 0
       logical :: quasistatic = .false.      !! rods bend without inertia
       type(three_moments) :: series         !! hinges and rods in series, when quasistatic
+      integer, allocatable :: relaxing(:)   !! hinges whose rotation is a state (only quasistatic, exact dampers)
+   contains
+      procedure :: fastest_relaxation
    end type hinge_law
 
 contains
 
    !> Take over the hinges of a chain; factor the three-moment equation if bending is quasistatic.
-   subroutine new_hinge_law(law, chain, quasistatic)
+   subroutine new_hinge_law(law, chain, quasistatic, exact_dampers)
       type(hinge_law), intent(out) :: law
       type(chain_config), intent(in) :: chain
       logical, intent(in) :: quasistatic
+      logical, intent(in) :: exact_dampers !! matters only when quasistatic
+      logical :: given(0:chain%n_rods - 1)
+      integer :: k
 
       law%n = chain%n_rods
       allocate (law%stiffness(0:law%n - 1), law%damping(0:law%n - 1), law%kink(0:law%n - 1))
@@ -39,7 +47,10 @@ contains
       law%has_damping = any(law%damping > 0.0_wp)
       law%has_kinks = any(law%kink /= 0.0_wp)
       law%quasistatic = quasistatic
-      if (quasistatic) call new_three_moments(law%series, law%stiffness, chain%length/(6.0_wp*chain%bending_stiffness))
+      given = quasistatic .and. exact_dampers .and. law%damping > 0.0_wp
+      law%relaxing = pack([(k, k=0, law%n - 1)], given)
+      if (quasistatic) call new_three_moments(law%series, law%stiffness, &
+                                              chain%length/(6.0_wp*chain%bending_stiffness), given)
    end subroutine new_hinge_law
 
    !> Hinge moments T(0:n); T(n) = 0 at the free end. The opening of hinge k is phi_{k+1} - phi_k (rigid or
@@ -48,12 +59,14 @@ contains
       type(hinge_law), intent(in) :: law
       integer, intent(in) :: n
       logical, intent(in) :: flexible !! angle and rate hold alpha and beta behind phi
-      real(wp), intent(in) :: angle(*)      !! phi(n) [, alpha(n), beta(n)] [rad]
+      real(wp), intent(in) :: angle(*)      !! phi(n) [, alpha(n), beta(n)] [, th of relaxing hinges] [rad]
       real(wp), intent(in) :: angle_rate(*) !! their rates [rad/s]
       real(wp), intent(inout) :: theta(0:n - 1) !! workspace
       real(wp), intent(out) :: moment(0:n)  !! T [N m]
 
-      if (law%quasistatic) then
+      if (size(law%relaxing) > 0) then
+         call relaxing_moments(law, n, angle, theta, moment)
+      else if (law%quasistatic) then
          call series_moments(law, n, angle, angle_rate, theta, moment)
       else if (flexible) then
          call flexible_moments(n, law%stiffness, law%damping, law%kink, law%has_damping, law%has_kinks, &
@@ -159,22 +172,121 @@ contains
       moment(0:n - 1) = moment(0:n - 1) + theta
    end subroutine series_moments
 
-   !> Joint rotations th and their rates, for output and ledger.
-   pure subroutine hinge_state(law, n, flexible, angle, angle_rate, theta, theta_rate)
+   !> Quasistatic bending with the rotations of the damped hinges as states: their moments, and the rotations
+   !> of the others, solve one system.
+   pure subroutine relaxing_moments(law, n, angle, theta, moment)
+      type(hinge_law), intent(in) :: law
+      integer, intent(in) :: n
+      real(wp), intent(in) :: angle(*)
+      real(wp), intent(out) :: theta(0:n - 1) !! solution: T of relaxing hinges, th of the others
+      real(wp), intent(out) :: moment(0:n)
+
+      call openings(n, .false., angle, theta)
+      if (law%has_kinks) theta = theta - law%kink
+      call moments_of_series(law, n, theta, angle(n + 1:n + size(law%relaxing)), moment)
+   end subroutine relaxing_moments
+
+   !> T(0:n) from openings (in `theta`) and given rotations of the relaxing hinges.
+   pure subroutine moments_of_series(law, n, theta, given, moment)
+      type(hinge_law), intent(in) :: law
+      integer, intent(in) :: n
+      real(wp), intent(inout) :: theta(0:n - 1)
+      real(wp), intent(in) :: given(:)
+      real(wp), intent(out) :: moment(0:n)
+      integer :: i
+
+      do i = 1, size(given)
+         theta(law%relaxing(i)) = theta(law%relaxing(i)) - given(i)
+      end do
+      call law%series%solve(theta)
+      moment(0:n - 1) = law%stiffness*theta
+      moment(n) = 0.0_wp
+      do i = 1, size(given)
+         moment(law%relaxing(i)) = theta(law%relaxing(i))
+      end do
+   end subroutine moments_of_series
+
+   !> th' = (T - C th)/D of the relaxing hinges; linear, so it serves changes as well.
+   pure subroutine relaxation_rates(law, moment, theta, theta_rate)
+      type(hinge_law), intent(in) :: law
+      real(wp), intent(in) :: moment(0:)      !! T (0:n) [N m]
+      real(wp), intent(in) :: theta(:)        !! th of the relaxing hinges [rad]
+      real(wp), intent(out) :: theta_rate(:)  !! [rad/s]
+
+      theta_rate = (moment(law%relaxing) - law%stiffness(law%relaxing)*theta)/law%damping(law%relaxing)
+   end subroutine relaxation_rates
+
+   !> A bound of the rates at which relaxing hinges follow [1/s]: (C + 1/F_min)/D, F_min the smallest eigenvalue of the
+   !> flexibility of the rods, by Gershgorin at least the smallest l/(6 EI).
+   pure real(wp) function fastest_relaxation(self)
+      class(hinge_law), intent(in) :: self
+      fastest_relaxation = 0.0_wp
+      if (size(self%relaxing) == 0) return
+      fastest_relaxation = maxval((self%stiffness(self%relaxing) + 1.0_wp/minval(self%series%slope))/ &
+                                  self%damping(self%relaxing))
+   end function fastest_relaxation
+
+   !> Rotations of the relaxing hinges at the start: those of springs and rods in balance, dampers at rest.
+   subroutine initial_joints(law, phi, theta)
+      type(hinge_law), intent(in) :: law
+      real(wp), intent(in) :: phi(:)    !! chord angles (n) [rad]
+      real(wp), intent(out) :: theta(:) !! of the relaxing hinges [rad]
+      type(three_moments) :: undamped
+      real(wp) :: all_joints(0:law%n - 1)
+
+      call new_three_moments(undamped, law%stiffness, law%series%slope, spread(.false., 1, law%n))
+      call openings(law%n, .false., phi, all_joints)
+      all_joints = all_joints - law%kink
+      call undamped%solve(all_joints)
+      theta = all_joints(law%relaxing)
+   end subroutine initial_joints
+
+   !> Joint rotations th, their rates, and the moments that bend the rods, for output and ledger. Rates of
+   !> undamped hinges beside relaxing ones are not needed and zero. In the `reduced` treatment rods feel the springs only.
+   pure subroutine hinge_state(law, n, flexible, angle, angle_rate, theta, theta_rate, moment, moment_rate)
       type(hinge_law), intent(in) :: law
       integer, intent(in) :: n
       logical, intent(in) :: flexible
       real(wp), intent(in) :: angle(*), angle_rate(*)
       real(wp), intent(out) :: theta(0:n - 1)      !! th [rad]
       real(wp), intent(out) :: theta_rate(0:n - 1) !! th' [rad/s]
+      real(wp), intent(out) :: moment(0:n)         !! [N m]
+      real(wp), intent(out) :: moment_rate(0:n)    !! [N m/s]
 
+      moment = 0.0_wp
+      moment_rate = 0.0_wp
       call openings(n, flexible, angle, theta)
       theta = theta - law%kink
       call openings(n, flexible, angle_rate, theta_rate)
       if (.not. law%quasistatic) return
+      associate (r => size(law%relaxing))
+         if (r > 0) then
+            call relaxing_state(law, n, angle(n + 1:n + r), theta, theta_rate, moment, moment_rate)
+            return
+         end if
+      end associate
       call law%series%solve(theta)
       call law%series%solve(theta_rate)
+      moment(0:n - 1) = law%stiffness*theta
+      moment_rate(0:n - 1) = law%stiffness*theta_rate
    end subroutine hinge_state
+
+   !> The same with relaxing hinges; on entry theta and theta_rate hold the openings and their rates.
+   pure subroutine relaxing_state(law, n, given, theta, theta_rate, moment, moment_rate)
+      type(hinge_law), intent(in) :: law
+      integer, intent(in) :: n
+      real(wp), intent(in) :: given(:) !! th of the relaxing hinges
+      real(wp), intent(inout) :: theta(0:n - 1), theta_rate(0:n - 1)
+      real(wp), intent(out) :: moment(0:n), moment_rate(0:n)
+      real(wp) :: rate(size(given))
+
+      call moments_of_series(law, n, theta, given, moment)
+      call relaxation_rates(law, moment, given, rate)
+      call moments_of_series(law, n, theta_rate, rate, moment_rate)
+      theta(law%relaxing) = given
+      theta_rate = 0.0_wp
+      theta_rate(law%relaxing) = rate
+   end subroutine relaxing_state
 
    !> Change of the hinge moments for a change of angles and rates (the law is linear but for the kinks).
    pure subroutine hinge_tangent(law, n, flexible, d_angle, d_angle_rate, work, d_moment)
@@ -186,6 +298,10 @@ contains
       real(wp), intent(out) :: d_moment(0:n)
 
       call openings(n, flexible, d_angle, work)
+      if (size(law%relaxing) > 0) then
+         call moments_of_series(law, n, work, d_angle(n + 1:n + size(law%relaxing)), d_moment)
+         return
+      end if
       if (law%quasistatic) call law%series%solve(work)
       d_moment(0:n - 1) = law%stiffness*work
       d_moment(n) = 0.0_wp

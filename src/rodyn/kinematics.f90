@@ -48,7 +48,7 @@ contains
             sums%turning = sums%turning + body%mass*cross(place, velocity) + body%inertia*p(3)
          end associate
       end if
-      values%elastic = elastic_energy(scene, q)
+      values%elastic = elastic_energy(scene, q, p)
       values%momentum = [cos(rotation)*sums%momentum(1) - sin(rotation)*sums%momentum(2), &
                          sin(rotation)*sums%momentum(1) + cos(rotation)*sums%momentum(2)]
       values%angular_momentum = sums%turning
@@ -128,35 +128,36 @@ contains
       cross = a(1)*b(2) - a(2)*b(1)
    end function cross
 
-   !> Elastic energy of hinges and rods [J]. Quasistatic rods hold l/(6 EI) (T^2 + T T' + T'^2) under end
-   !> moments T, T'; that is the bending energy of their slopes.
-   pure real(wp) function elastic_energy(scene, q)
+   !> Elastic energy of hinges and rods [J].
+   pure real(wp) function elastic_energy(scene, q, p)
       type(scene_type), intent(in) :: scene
-      real(wp), intent(in) :: q(:)
-      real(wp) :: theta(0:scene%n - 1), unused(0:scene%n - 1)
+      real(wp), intent(in) :: q(:), p(:)
+      real(wp), dimension(0:scene%n - 1) :: theta, theta_rate
+      real(wp), dimension(0:scene%n) :: moment, moment_rate
       real(wp), dimension(scene%n) :: alpha, beta, alpha_rate, beta_rate
       integer :: k
 
       associate (first => scene%n_base + 1)
-         call hinge_state(scene%hinges, scene%n, scene%dynamic_bending, q(first:), q(first:), theta, unused)
+         call hinge_state(scene%hinges, scene%n, scene%dynamic_bending, q(first:), p(first:), theta, theta_rate, &
+                          moment, moment_rate)
       end associate
       elastic_energy = 0.5_wp*sum(scene%hinges%stiffness*theta**2)
       if (.not. (scene%dynamic_bending .or. scene%quasistatic)) return
-      call slopes(scene, q, q, alpha, beta, alpha_rate, beta_rate)
+      call slopes(scene, q, p, alpha, beta, alpha_rate, beta_rate)
       do k = 1, scene%n
          elastic_energy = elastic_energy + scene%rods(scene%rod_of(k))%kappa* &
                           (alpha(k)**2 + alpha(k)*beta(k) + beta(k)**2)
       end do
    end function elastic_energy
 
-   !> End slopes alpha, beta and their rates: states, or slaved to the hinge springs (not to their dampers,
-   !> which the reduced system sees through Rayleigh's function only), or zero.
+   !> End slopes alpha, beta and their rates: states, or slaved to the moments in the hinges, or zero.
    pure subroutine slopes(scene, q, p, alpha, beta, alpha_rate, beta_rate)
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: q(:), p(:)
       real(wp), intent(out) :: alpha(:), beta(:)           !! (n) [rad]
       real(wp), intent(out) :: alpha_rate(:), beta_rate(:) !! (n) [rad/s]
-      real(wp) :: theta(0:scene%n - 1), theta_rate(0:scene%n - 1)
+      real(wp), dimension(0:scene%n - 1) :: theta, theta_rate
+      real(wp), dimension(0:scene%n) :: moment, moment_rate
 
       alpha = 0.0_wp
       beta = 0.0_wp
@@ -169,25 +170,27 @@ contains
             alpha_rate = p(scene%alpha_at() + 1:scene%alpha_at() + n)
             beta_rate = p(scene%beta_at() + 1:scene%beta_at() + n)
          else if (scene%quasistatic) then
-            call hinge_state(hinges, n, .false., q(first:), p(first:), theta, theta_rate)
-            call slopes_from_moments(hinges%series, hinges%stiffness*theta, alpha, beta)
-            call slopes_from_moments(hinges%series, hinges%stiffness*theta_rate, alpha_rate, beta_rate)
+            call hinge_state(hinges, n, .false., q(first:), p(first:), theta, theta_rate, moment, moment_rate)
+            call slopes_from_moments(hinges%series, moment(:n - 1), alpha, beta)
+            call slopes_from_moments(hinges%series, moment_rate(:n - 1), alpha_rate, beta_rate)
          end if
       end associate
    end subroutine slopes
 
    !> Power that the dampers take, sum D th'^2 [W].
-   pure real(wp) function dissipated_power(scene, p)
+   pure real(wp) function dissipated_power(scene, q, p)
       type(scene_type), intent(in) :: scene
-      real(wp), intent(in) :: p(:)
-      real(wp) :: rate(0:scene%n - 1), unused(0:scene%n - 1)
+      real(wp), intent(in) :: q(:), p(:)
+      real(wp), dimension(0:scene%n - 1) :: theta, theta_rate
+      real(wp), dimension(0:scene%n) :: moment, moment_rate
 
       dissipated_power = 0.0_wp
       if (.not. scene%hinges%has_damping) return
       associate (first => scene%n_base + 1)
-         call hinge_state(scene%hinges, scene%n, scene%dynamic_bending, p(first:), p(first:), unused, rate)
+         call hinge_state(scene%hinges, scene%n, scene%dynamic_bending, q(first:), p(first:), theta, theta_rate, &
+                          moment, moment_rate)
       end associate
-      dissipated_power = sum(scene%hinges%damping*rate**2)
+      dissipated_power = sum(scene%hinges%damping*theta_rate**2)
    end function dissipated_power
 
    !> Power of the loads on the spacecraft and on the nodes [W].

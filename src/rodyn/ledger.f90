@@ -21,8 +21,8 @@ contains
       type(run_row), intent(inout) :: row    !! of the same number of rods
       type(invariants_type) :: values
 
-      associate (m => motion%n_dof, scene => motion%dynamics%scene)
-         associate (q => y(:m), p => y(m + 1:2*m))
+      associate (r => motion%n_q, m => motion%n_dof, scene => motion%dynamics%scene)
+         associate (q => y(:r), p => y(r + 1:r + m))
             row%time = t
             row%phi = q(scene%phi_at() + 1:scene%phi_at() + scene%n)
             row%phi_rate = p(scene%phi_at() + 1:scene%phi_at() + scene%n)
@@ -40,9 +40,9 @@ contains
          end associate
          row%energy_kinetic = values%kinetic
          row%energy_elastic = values%elastic
-         row%work_external = y(2*m + 1)
-         row%energy_dissipated = y(2*m + 2)
-         row%energy_residual = (values%kinetic + values%elastic + y(2*m + 2)) - (y(2*m + 1) + initial_energy)
+         row%work_external = y(r + m + 1)
+         row%energy_dissipated = y(r + m + 2)
+         row%energy_residual = (values%kinetic + values%elastic + y(r + m + 2)) - (y(r + m + 1) + initial_energy)
          row%momentum_x = values%momentum(1)
          row%momentum_y = values%momentum(2)
          row%angular_momentum = values%angular_momentum

@@ -21,7 +21,7 @@ contains
       real(wp), intent(in) :: a(:)         !! accelerations p' (dof), held fixed
       logical, intent(in) :: loaded        !! node_force is to be used
       real(wp), intent(in) :: node_force(:, :) !! X, Y at the nodes (2, n) [N]
-      real(wp), intent(in) :: dq(:), dp(:) !! direction (dof)
+      real(wp), intent(in) :: dq(:), dp(:) !! direction (as q and p)
       real(wp), intent(out) :: dr(:)       !! change of the balance (dof), rows as in p
       real(wp) :: inner(2, scene%n), d_inner(2, scene%n) ! acceleration of the inner node of rod k and its change
       real(wp) :: moment(0:scene%n), work(0:scene%n - 1)

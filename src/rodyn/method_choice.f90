@@ -54,7 +54,7 @@ contains
       if (scene%hinges%has_damping) then
          call decay_rates(scene, q, decay, error)
          if (allocated(error)) return
-         fastest = maxval(decay)
+         fastest = max(maxval(decay), scene%hinges%fastest_relaxation())
       end if
       choice%reason = 'auto: frequencies '//short(lowest)//' to '//short(highest)//' rad/s'
       if (.not. highest > 0.0_wp) choice%reason = 'auto: no vibrations'

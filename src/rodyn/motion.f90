@@ -1,4 +1,5 @@
-!> The motion of a scene as first-order equations: y = (q, p [, work of the loads, dissipated energy]).
+!> The motion of a scene as first-order equations: y = (q, p [, work of the loads, dissipated energy]). Behind the
+!> coordinates of the article, q ends with the rotations of relaxing hinges, if there are any (`rodyn_hinge_law`).
 !>
 !> The two integrals are there only with a ledger. They take no part in step-size control, so that a run with a
 !> ledger makes the same steps as one without.
@@ -11,17 +12,19 @@ module rodyn_motion
    use rodyn_accelerations, only: dynamics_type, new_dynamics
    use rodyn_assembled, only: assembled_system, new_assembled_system, mass_matrix
    use rodyn_linearisation, only: balance_tangent
-   use rodyn_kinematics, only: load_power, dissipated_power
+   use rodyn_kinematics, only: load_power, dissipated_power, invariants_type, invariants
+   use rodyn_hinge_law, only: relaxation_rates, initial_joints, hinge_tangent
    use rodyn_lapack, only: dpotrf, dpotrs
    implicit none (type, external)
    private
-   public :: motion_type, new_motion, initial_state
+   public :: motion_type, new_motion, initial_state, state_invariants
 
    !> A running scene.
    type, extends(ode_system) :: motion_type
       type(dynamics_type) :: dynamics
       type(assembled_system) :: system !! mass matrix of the Jacobian; allocated when first needed
-      integer :: n_dof = 0             !! length of q and of p
+      integer :: n_q = 0               !! length of q
+      integer :: n_dof = 0             !! length of p
       logical :: free = .true.         !! the spacecraft moves
       logical :: ledger = .true.       !! y ends with work and dissipated energy
    contains
@@ -40,10 +43,11 @@ contains
 
       call new_dynamics(motion%dynamics, scene, error)
       if (allocated(error)) return
+      motion%n_q = scene%n_q
       motion%n_dof = scene%n_dof
       motion%free = scene%n_base > 0
       motion%ledger = ledger
-      motion%n_controlled = 2*scene%n_dof
+      motion%n_controlled = scene%n_q + scene%n_dof
       motion%n_states = motion%n_controlled + merge(2, 0, ledger)
    end subroutine new_motion
 
@@ -54,12 +58,13 @@ contains
       real(wp), allocatable, intent(out) :: y(:) !! (n_states)
 
       allocate (y(motion%n_states), source=0.0_wp)
-      associate (scene => motion%dynamics%scene, n_dof => motion%n_dof, n => motion%dynamics%scene%n)
+      associate (scene => motion%dynamics%scene, n_q => motion%n_q, n_dof => motion%n_dof)
          if (motion%free) then
             y(1:3) = [initial%displacement_x, initial%displacement_y, initial%rotation]
-            y(n_dof + 1:n_dof + 3) = [initial%velocity_x, initial%velocity_y, initial%omega]
+            y(n_q + 1:n_q + 3) = [initial%velocity_x, initial%velocity_y, initial%omega]
          end if
          call place(scene%phi_at(), initial%phi, initial%phi_rate)
+         if (n_q > n_dof) call initial_joints(scene%hinges, initial%phi, y(n_dof + 1:n_q))
          if (.not. scene%dynamic_bending) return
          call place(scene%alpha_at(), initial%alpha, initial%alpha_rate)
          call place(scene%beta_at(), initial%beta, initial%beta_rate)
@@ -71,7 +76,7 @@ contains
          integer, intent(in) :: before
          real(wp), intent(in) :: values(:), rates(:)
          y(before + 1:before + size(values)) = values
-         y(motion%n_dof + before + 1:motion%n_dof + before + size(rates)) = rates
+         y(motion%n_q + before + 1:motion%n_q + before + size(rates)) = rates
       end subroutine place
 
    end subroutine initial_state
@@ -84,19 +89,30 @@ contains
       real(wp), contiguous, intent(out) :: ydot(:)
       logical, intent(out) :: ok
 
-      associate (m => self%n_dof)
-         call self%dynamics%accelerations(t, y(1:m), y(m + 1:2*m), ydot(m + 1:2*m), ok)
-         ydot(1:m) = y(m + 1:2*m)
+      associate (r => self%n_q, m => self%n_dof)
+         call self%dynamics%accelerations(t, y(1:r), y(r + 1:r + m), ydot(r + 1:r + m), ok)
+         ydot(1:m) = y(r + 1:r + m)
          if (self%free) then
-            ydot(1) = ydot(1) + y(m + 3)*y(2)
-            ydot(2) = ydot(2) - y(m + 3)*y(1)
+            ydot(1) = ydot(1) + y(r + 3)*y(2)
+            ydot(2) = ydot(2) - y(r + 3)*y(1)
          end if
+         if (r > m) call relaxation_rates(self%dynamics%scene%hinges, self%dynamics%work%moment, y(m + 1:r), ydot(m + 1:r))
          if (.not. self%ledger) return
-         ydot(2*m + 1) = load_power(self%dynamics%scene, y(1:m), y(m + 1:2*m), self%dynamics%forces%base, &
-                                    self%dynamics%regime%on_nodes, self%dynamics%forces%node)
-         ydot(2*m + 2) = dissipated_power(self%dynamics%scene, y(m + 1:2*m))
+         ydot(r + m + 1) = load_power(self%dynamics%scene, y(1:r), y(r + 1:r + m), self%dynamics%forces%base, &
+                                      self%dynamics%regime%on_nodes, self%dynamics%forces%node)
+         ydot(r + m + 2) = dissipated_power(self%dynamics%scene, y(1:r), y(r + 1:r + m))
       end associate
    end subroutine rhs
+
+   !> Energies and momenta of a state.
+   pure function state_invariants(motion, y) result(values)
+      type(motion_type), intent(in) :: motion
+      real(wp), intent(in) :: y(:) !! (n_states)
+      type(invariants_type) :: values
+      associate (r => motion%n_q, m => motion%n_dof)
+         values = invariants(motion%dynamics%scene, y(:r), y(r + 1:r + m))
+      end associate
+   end function state_invariants
 
    !> Exact Jacobian: the linearised balance solved with the mass matrix.
    subroutine jacobian(self, t, y, jac, ok)
@@ -106,61 +122,82 @@ contains
       real(wp), contiguous, intent(out) :: jac(:, :)
       logical, intent(out) :: ok
       type(error_type), allocatable :: error
-      real(wp) :: a(self%n_dof), direction(2*self%n_dof), change(self%n_dof, 2*self%n_dof)
+      real(wp) :: a(self%n_dof), direction(self%n_controlled), change(self%n_dof, self%n_controlled)
       integer :: j, info
 
-      associate (m => self%n_dof, scene => self%dynamics%scene, work => self%dynamics%work)
+      associate (r => self%n_q, m => self%n_dof, scene => self%dynamics%scene, work => self%dynamics%work)
          jac = 0.0_wp
          ok = .true.
          if (.not. allocated(self%system%m)) call new_assembled_system(self%system, scene, error)
-         if (.not. allocated(error)) call self%dynamics%accelerations(t, y(1:m), y(m + 1:2*m), a, ok)
+         if (.not. allocated(error)) call self%dynamics%accelerations(t, y(1:r), y(r + 1:r + m), a, ok)
          ok = ok .and. .not. allocated(error)
          if (.not. ok) return
          direction = 0.0_wp
-         do j = 1, 2*m
+         do j = 1, r + m
             direction(j) = 1.0_wp
-            call balance_tangent(scene, y(1:m), y(m + 1:2*m), a, self%dynamics%regime%on_nodes, &
-                                 self%dynamics%forces%node, direction(1:m), direction(m + 1:), change(:, j))
+            call balance_tangent(scene, y(1:r), y(r + 1:r + m), a, self%dynamics%regime%on_nodes, &
+                                 self%dynamics%forces%node, direction(1:r), direction(r + 1:), change(:, j))
+            if (r > m) call relaxation_column(self, direction(1:r), direction(r + 1:), jac(m + 1:r, j))
             direction(j) = 0.0_wp
          end do
-         call mass_matrix(self%system, scene, work%sine, work%cosine, y(1:m))
+         call mass_matrix(self%system, scene, work%sine, work%cosine, y(1:r))
          call dpotrf('L', m, self%system%m, m, info)
          ok = info == 0
          if (.not. ok) return
-         call dpotrs('L', m, 2*m, self%system%m, m, change, m, info)
-         jac(m + 1:2*m, 1:2*m) = -change
+         call dpotrs('L', m, r + m, self%system%m, m, change, m, info)
+         jac(r + 1:r + m, 1:r + m) = -change
          do j = 1, m
-            jac(j, m + j) = 1.0_wp
+            jac(j, r + j) = 1.0_wp
          end do
          if (self%free) then
-            jac(1, 2) = y(m + 3)
-            jac(2, 1) = -y(m + 3)
-            jac(1, m + 3) = y(2)
-            jac(2, m + 3) = -y(1)
+            jac(1, 2) = y(r + 3)
+            jac(2, 1) = -y(r + 3)
+            jac(1, r + 3) = y(2)
+            jac(2, r + 3) = -y(1)
          end if
-         if (self%ledger) call power_rows(self, y(1:m), y(m + 1:2*m), jac(2*m + 1:, :))
+         if (self%ledger) call power_rows(self, y(1:r), y(r + 1:r + m), jac(r + m + 1:, :))
       end associate
    end subroutine jacobian
 
-   !> Rows of the two powers. The power of the loads is linear in p and its dependence on phi_j is that of the
-   !> lever l_j W_j n_j; the dissipated power is quadratic in p.
+   !> Change of th' of the relaxing hinges.
+   subroutine relaxation_column(self, dq, dp, column)
+      class(motion_type), intent(in) :: self
+      real(wp), intent(in) :: dq(:), dp(:)
+      real(wp), intent(out) :: column(:)
+      real(wp) :: moment(0:self%dynamics%scene%n), work(0:self%dynamics%scene%n - 1)
+
+      associate (scene => self%dynamics%scene, first => self%dynamics%scene%n_base + 1)
+         call hinge_tangent(scene%hinges, scene%n, .false., dq(first:), dp(first:), work, moment)
+         call relaxation_rates(scene%hinges, moment, dq(self%n_dof + 1:), column)
+      end associate
+   end subroutine relaxation_column
+
+   !> Rows of the two powers, by central differences that are exact: the power of the loads is linear in p, and its
+   !> dependence on phi_j is that of the lever l_j W_j n_j; the dissipated power is quadratic in q and p.
    subroutine power_rows(self, q, p, rows)
       class(motion_type), intent(in) :: self
       real(wp), intent(in) :: q(:), p(:)
       real(wp), intent(inout) :: rows(:, :)
-      real(wp) :: unit(self%n_dof), force(2), omega
+      real(wp) :: dq(self%n_q), dp(self%n_dof), force(2), omega
       integer :: j, k
 
-      associate (m => self%n_dof, scene => self%dynamics%scene, forces => self%dynamics%forces, &
+      associate (r => self%n_q, m => self%n_dof, scene => self%dynamics%scene, forces => self%dynamics%forces, &
                  loaded => self%dynamics%regime%on_nodes)
-         unit = 0.0_wp
+         dq = 0.0_wp
+         dp = 0.0_wp
          do j = 1, m
-            unit(j) = 1.0_wp
-            rows(1, m + j) = load_power(scene, q, unit, forces%base, loaded, forces%node)
-            ! 2 b(p, unit) of the quadratic form b(p, p)
-            rows(2, m + j) = 0.5_wp*(dissipated_power(scene, p + unit) - dissipated_power(scene, p - unit))
-            unit(j) = 0.0_wp
+            dp(j) = 1.0_wp
+            rows(1, r + j) = load_power(scene, q, dp, forces%base, loaded, forces%node)
+            rows(2, r + j) = 0.5_wp*(dissipated_power(scene, q, p + dp) - dissipated_power(scene, q, p - dp))
+            dp(j) = 0.0_wp
          end do
+         if (r > m) then ! only relaxing hinges dissipate by q
+            do j = 1, r
+               dq(j) = 1.0_wp
+               rows(2, j) = 0.5_wp*(dissipated_power(scene, q + dq, p) - dissipated_power(scene, q - dq, p))
+               dq(j) = 0.0_wp
+            end do
+         end if
          if (.not. loaded) return
          omega = 0.0_wp
          if (self%free) omega = p(3)

@@ -6,8 +6,8 @@ module rodyn_run
    use rodyn_case_config, only: case_config
    use rodyn_case_reader, only: resolved_case
    use rodyn_scene, only: scene_type, new_scene
-   use rodyn_motion, only: motion_type, new_motion, initial_state
-   use rodyn_kinematics, only: invariants_type, invariants
+   use rodyn_motion, only: motion_type, new_motion, initial_state, state_invariants
+   use rodyn_kinematics, only: invariants_type
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, time_text
    use rodyn_integrators, only: new_integrator, sundials_version
    use rodyn_method_choice, only: method_choice, choose_method
@@ -117,7 +117,7 @@ contains
       type(invariants_type) :: start
 
       if (.not. self%started .and. motion%ledger) then
-         start = invariants(motion%dynamics%scene, y(:motion%n_dof), y(motion%n_dof + 1:2*motion%n_dof))
+         start = state_invariants(motion, y)
          self%initial_energy = start%kinetic + start%elastic
       end if
       self%started = .true.

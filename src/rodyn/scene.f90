@@ -21,7 +21,8 @@ module rodyn_scene
    type :: scene_type
       integer :: n = 0       !! rods
       integer :: n_base = 3  !! unknowns of the spacecraft: 3, or 0 when it is fixed
-      integer :: n_dof = 0   !! length of q and of p
+      integer :: n_dof = 0   !! length of p
+      integer :: n_q = 0     !! length of q: n_dof, and the rotations of relaxing hinges behind (`rodyn_hinge_law`)
       logical :: dynamic_bending = .true. !! alpha and beta are unknowns
       logical :: quasistatic = .false.    !! alpha and beta follow from the hinge moments
       logical :: lumped = .false.         !! all mass in the nodes
@@ -91,7 +92,8 @@ contains
       if (allocated(error)) return
       call compile_nodes(scene, config, error)
       if (allocated(error)) return
-      call new_hinge_law(scene%hinges, config%chain, scene%quasistatic)
+      call new_hinge_law(scene%hinges, config%chain, scene%quasistatic, config%model%dampers == 'exact')
+      scene%n_q = scene%n_dof + size(scene%hinges%relaxing)
       call new_load_set(scene%loads, config%loads, config%t_end)
    end subroutine new_scene
 

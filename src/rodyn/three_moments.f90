@@ -4,15 +4,16 @@
 !>     alpha_k = -(l/6EI)(2 T_{k-1} + T_k),   beta_k = (l/6EI)(T_{k-1} + 2 T_k),   T_n = 0,
 !> so the joint rotations th obey  th_k + beta_k - alpha_{k+1} = opening_k - gamma_k. With T = C th this is
 !>     (I + F C) th = opening - gamma,   F tridiagonal, symmetric, positive definite:
-!> constant, and factored once. A free hinge (C = 0) needs no exception.
+!> constant, and factored once. A free hinge (C = 0) needs no exception. Where a damper makes the moment T_k the
+!> unknown and th_k a given state, column k is that of T instead: F in place of I + F C.
 module rodyn_three_moments
    use rodyn_kinds, only: wp
    implicit none (type, external)
    private
    public :: three_moments, new_three_moments, slopes_from_moments
 
-   !> LU factors of I + F C. All its eigenvalues are >= 1 and it is similar to a symmetric matrix, so no
-   !> pivoting is needed.
+   !> LU factors of I + F C. Scaling of its columns makes it symmetric and positive definite, so no pivoting is
+   !> needed.
    type :: three_moments
       integer :: n = 0
       real(wp), allocatable :: lower(:) !! multipliers (1:n-1)
@@ -27,26 +28,27 @@ module rodyn_three_moments
 contains
 
    !> Build and factor.
-   pure subroutine new_three_moments(series, stiffness, slope)
+   pure subroutine new_three_moments(series, stiffness, slope, given)
       type(three_moments), intent(out) :: series
       real(wp), intent(in) :: stiffness(0:) !! C (0:n-1) [N m/rad]
       real(wp), intent(in) :: slope(:)      !! l/(6 EI) (1:n) [1/(N m)]
-      real(wp) :: diagonal, below
+      logical, intent(in) :: given(0:)      !! th_k is given and T_k unknown (0:n-1)
+      real(wp) :: diagonal, factor(0:size(slope) - 1)
       integer :: k, n
 
       n = size(slope)
       series%n = n
       series%slope = slope
+      factor = merge(1.0_wp, stiffness, given)
       allocate (series%lower(n - 1), series%pivot(0:n - 1), series%upper(0:n - 2))
       do k = 0, n - 1
-         diagonal = 1.0_wp + 2.0_wp*slope(k + 1)*stiffness(k)
-         if (k > 0) diagonal = diagonal + 2.0_wp*slope(k)*stiffness(k)
+         diagonal = merge(0.0_wp, 1.0_wp, given(k)) + 2.0_wp*slope(k + 1)*factor(k)
+         if (k > 0) diagonal = diagonal + 2.0_wp*slope(k)*factor(k)
          if (k > 0) then
-            below = slope(k)*stiffness(k - 1)
-            series%lower(k) = below*series%pivot(k - 1)
+            series%lower(k) = slope(k)*factor(k - 1)*series%pivot(k - 1)
             diagonal = diagonal - series%lower(k)*series%upper(k - 1)
          end if
-         if (k < n - 1) series%upper(k) = slope(k + 1)*stiffness(k + 1)
+         if (k < n - 1) series%upper(k) = slope(k + 1)*factor(k + 1)
          series%pivot(k) = 1.0_wp/diagonal
       end do
    end subroutine new_three_moments
