@@ -11,7 +11,7 @@ module rodyn_hinge_law
    use rodyn_three_moments, only: three_moments, new_three_moments
    implicit none (type, external)
    private
-   public :: hinge_law, new_hinge_law, hinge_moments, hinge_state, hinge_tangent, relaxation_rates, initial_joints
+   public :: hinge_law, new_hinge_law, hinge_moments, hinge_state, hinge_tangent, openings, relaxation_rates, initial_joints
 
    !> Springs, dampers and kinks of hinges 0..n-1.
    type :: hinge_law

@@ -2,7 +2,7 @@
 module rodyn_kinematics
    use rodyn_kinds, only: wp
    use rodyn_scene, only: scene_type
-   use rodyn_hinge_law, only: hinge_state
+   use rodyn_hinge_law, only: hinge_state, openings
    use rodyn_three_moments, only: slopes_from_moments
    implicit none (type, external)
    private
@@ -187,8 +187,11 @@ contains
       dissipated_power = 0.0_wp
       if (.not. scene%hinges%has_damping) return
       associate (first => scene%n_base + 1)
-         call hinge_state(scene%hinges, scene%n, scene%dynamic_bending, q(first:), p(first:), theta, theta_rate, &
-                          moment, moment_rate)
+         if (scene%quasistatic) then
+            call hinge_state(scene%hinges, scene%n, .false., q(first:), p(first:), theta, theta_rate, moment, moment_rate)
+         else
+            call openings(scene%n, scene%dynamic_bending, p(first:), theta_rate)
+         end if
       end associate
       dissipated_power = sum(scene%hinges%damping*theta_rate**2)
    end function dissipated_power

@@ -10,6 +10,17 @@ module rodyn_loads
    private
    public :: load_set, new_load_set, load_regime, new_load_regime, load_forces, evaluate_loads, load_value
 
+   !> Words of the namelist as numbers, so that the right-hand side compares no text.
+   integer, parameter :: law_constant = 1, law_sine_squared = 2, law_smooth_step = 3, law_table = 4
+
+   !> A load that changes within a regime.
+   type :: varying_load
+      integer :: law = law_constant
+      integer :: node = 0      !! 1..n; 0: the spacecraft
+      integer :: component = 1 !! 1: X, 2: Y, 3: M
+      type(load_config) :: given
+   end type varying_load
+
    !> All loads of a case and the times where any of them is not smooth.
    type :: load_set
       type(load_config), allocatable :: loads(:)
@@ -20,7 +31,7 @@ module rodyn_loads
    type :: load_regime
       logical :: on_spacecraft = .false. !! some load acts on the spacecraft
       logical :: on_nodes = .false.      !! some load acts on a node
-      type(load_config), allocatable :: varying(:) !! those that change with time
+      type(varying_load), allocatable :: varying(:) !! those that change with time
       real(wp) :: constant_base(3) = 0.0_wp        !! X_C, Y_C [N], M_C [N m] of all others
       real(wp), allocatable :: constant_node(:, :) !! X, Y of all others (2, n), size 0 if nodes are free [N]
    end type load_regime
@@ -89,7 +100,12 @@ contains
       do i = 1, size(set%loads)
          if (.not. acts(i)) cycle
          if (varies(i)) then
-            regime%varying(count(acts(:i) .and. varies(:i))) = set%loads(i)
+            associate (load => regime%varying(count(acts(:i) .and. varies(:i))))
+               load%given = set%loads(i)
+               load%law = law_of(set%loads(i))
+               load%component = component_of(set%loads(i))
+               if (set%loads(i)%target == 'node') load%node = set%loads(i)%node
+            end associate
             cycle
          end if
          associate (load => set%loads(i))
@@ -110,7 +126,7 @@ contains
       type(load_regime), intent(in) :: regime
       real(wp), intent(in) :: t        !! [s], within the regime
       logical, intent(in) :: fresh     !! also copy the constant loads
-      integer :: i, component
+      integer :: i
 
       if (fresh) then
          forces%base = regime%constant_base
@@ -119,17 +135,16 @@ contains
       if (size(regime%varying) == 0) return
       forces%base = regime%constant_base
       do i = 1, size(regime%varying)
-         associate (load => regime%varying(i))
-            if (load%target == 'node') forces%node(:, load%node) = regime%constant_node(:, load%node)
+         associate (node => regime%varying(i)%node)
+            if (node > 0) forces%node(:, node) = regime%constant_node(:, node)
          end associate
       end do
       do i = 1, size(regime%varying)
-         associate (load => regime%varying(i))
-            component = component_of(load)
-            if (load%target == 'node') then
-               forces%node(component, load%node) = forces%node(component, load%node) + load_value(load, t)
+         associate (load => regime%varying(i), component => regime%varying(i)%component)
+            if (load%node > 0) then
+               forces%node(component, load%node) = forces%node(component, load%node) + value_at(load%law, load%given, t)
             else
-               forces%base(component) = forces%base(component) + load_value(load, t)
+               forces%base(component) = forces%base(component) + value_at(load%law, load%given, t)
             end if
          end associate
       end do
@@ -139,20 +154,43 @@ contains
    pure real(wp) function load_value(load, t)
       type(load_config), intent(in) :: load
       real(wp), intent(in) :: t !! [s]
+      load_value = value_at(law_of(load), load, t)
+   end function load_value
+
+   !> The same with the law as a number.
+   pure real(wp) function value_at(law, load, t)
+      integer, intent(in) :: law
+      type(load_config), intent(in) :: load
+      real(wp), intent(in) :: t !! [s]
       real(wp) :: x
 
+      select case (law)
+      case (law_sine_squared)
+         value_at = load%value*sin(load%rate*t)**2
+      case (law_smooth_step) ! continuous acceleration: value and two derivatives vanish at the start
+         x = min(max((t - load%t_start)/rise_of(load), 0.0_wp), 1.0_wp)
+         value_at = load%value*x**3*(10.0_wp - x*(15.0_wp - 6.0_wp*x))
+      case (law_table)
+         value_at = interpolate(load%times, load%values, t)
+      case default
+         value_at = load%value
+      end select
+   end function value_at
+
+   !> Number of a law.
+   pure integer function law_of(load)
+      type(load_config), intent(in) :: load
       select case (load%law)
       case ('sine_squared')
-         load_value = load%value*sin(load%rate*t)**2
-      case ('smooth_step') ! continuous acceleration: value and two derivatives vanish at the start
-         x = min(max((t - load%t_start)/rise_of(load), 0.0_wp), 1.0_wp)
-         load_value = load%value*x**3*(10.0_wp - x*(15.0_wp - 6.0_wp*x))
+         law_of = law_sine_squared
+      case ('smooth_step')
+         law_of = law_smooth_step
       case ('table')
-         load_value = interpolate(load%times, load%values, t)
+         law_of = law_table
       case default
-         load_value = load%value
+         law_of = law_constant
       end select
-   end function load_value
+   end function law_of
 
    !> Piecewise linear; constant beyond the ends of the table.
    pure real(wp) function interpolate(times, values, t)

@@ -41,7 +41,7 @@ contains
 
       integer :: k, ip, ia, ib
       real(wp) :: omega, omega_rate, w, w2, lw2, w_rate, alpha, beta, qa, qb
-      real(wp) :: mv, mv_rate, mvv, mvv_rate, d, outer, central, r0, gq, hq
+      real(wp) :: mv, mv_rate, mvv, mvv_rate, d, arm, outer, central, r0, gq, hq
       real(wp) :: pee, pen, pnn, det, be, bn, mu, inv, ce, cn, r, ee, en, nn, cd, sd, ae, an, smallest
 
       ip = n_base
@@ -74,6 +74,7 @@ contains
             beta = q(ib + k)
             w = omega + p(ip + k)
             w2 = w*w
+            w = 2.0_wp*w
             lw2 = rod%length*w2
             mv = i%a1*alpha + i%b1*beta
             mv_rate = i%a1*p(ia + k) + i%b1*p(ib + k)
@@ -87,15 +88,16 @@ contains
             qb = moment(k) - rod%kappa*(alpha + 2.0_wp*beta)
             gq = rod%g(1)*qa + rod%g(2)*qb
             hq = rod%h(1)*qa + rod%h(2)*qb
-            r0 = moment(k) - moment(k - 1) - hq - w2*(i%sa*alpha + i%sb*beta) - 2.0_wp*w*mvv_rate
+            r0 = moment(k) - moment(k - 1) - hq - w2*(i%sa*alpha + i%sb*beta) - w*mvv_rate
             outward(4, k) = w2*alpha + rod%b_inverse(1)*qa + rod%b_inverse(2)*qb
             outward(5, k) = w2*beta + rod%b_inverse(2)*qa + rod%b_inverse(3)*qb
 
             ! Row of W'.
             d = rod%m2_reduced + mvv
+            arm = d - rod%length_m1
             outer = rod%outer + mvv
             central = rod%central + rod%m0_reduced*mvv
-            inv = d + rod%length**2*pnn
+            inv = d + rod%length_2*pnn
             smallest = min(smallest, inv)
             inv = 1.0_wp/inv
             ce = rod%length*pen - mv
@@ -109,13 +111,13 @@ contains
             outward(6, k) = lw2
 
             ! The chain seen from the inner node, in the axes of rod k.
-            be = be - w2*i%m1 - 2.0_wp*w*mv_rate + ce*r
-            bn = (bn*(d - rod%length*rod%m1_reduced) + cn*r0)*inv + gq
+            be = be - w2*i%m1 - w*mv_rate + ce*r
+            bn = (bn*arm + cn*r0)*inv + gq
             nn = central + pnn*outer
-            ee = pee*d + rod%length**2*det + mv*(2.0_wp*rod%length*pen - mv)
-            en = pen*(d - rod%length*rod%m1_reduced) + mv*cn
+            ee = pee*d + rod%length_2*det + mv*(2.0_wp*rod%length*pen - mv)
+            en = pen*arm + mv*cn
             det = (i%m0*nn + pee*central + det*outer + &
-                   mv*(2.0_wp*pen*(rod%length*rod%m0_reduced - rod%m1_reduced) - (rod%m0_reduced + pnn)*mv))*inv
+                   mv*(2.0_wp*pen*rod%offset - (rod%m0_reduced + pnn)*mv))*inv
             ee = i%m0 + ee*inv
             en = en*inv
             nn = nn*inv

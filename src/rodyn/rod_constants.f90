@@ -25,6 +25,9 @@ module rodyn_rod_constants
       real(wp) :: m1_reduced = 0.0_wp        !! [kg m]
       real(wp) :: m2_reduced = 0.0_wp        !! [kg m^2]
       real(wp) :: central = 0.0_wp           !! m0 m2 - m1^2 of the reduced inertias [kg^2 m^2]
+      real(wp) :: length_2 = 0.0_wp          !! l^2 [m^2]
+      real(wp) :: length_m1 = 0.0_wp         !! l m1 of the reduced inertias [kg m^2]
+      real(wp) :: offset = 0.0_wp            !! l m0 - m1 of them [kg m]
       real(wp) :: outer = 0.0_wp             !! m2 - 2 l m1 + l^2 m0 of them: moment about the outer node [kg m^2]
    end type rod_constants
 
@@ -63,6 +66,9 @@ contains
          rod%m2_reduced = rod%inertia%m2
       end if
       rod%central = rod%m0_reduced*rod%m2_reduced - rod%m1_reduced**2
+      rod%length_2 = length**2
+      rod%length_m1 = length*rod%m1_reduced
+      rod%offset = length*rod%m0_reduced - rod%m1_reduced
       rod%outer = rod%m2_reduced - 2.0_wp*length*rod%m1_reduced + length**2*rod%m0_reduced
    end subroutine new_rod_constants
 
