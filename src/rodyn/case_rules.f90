@@ -186,6 +186,7 @@ contains
          if (order == 1 .or. order > 8) rule = "must be 0 or lie in 2..8 when method = 'erk'"
       case ('dop853')
          if (order /= 0 .and. order /= 8) rule = "must be 0 or 8 when method = 'dop853'"
+      case default ! 'adams' takes what the table allows
       end select
    end function order_rule
 
