@@ -213,8 +213,12 @@ contains
       real(wp), intent(in) :: moment(0:)      !! T (0:n) [N m]
       real(wp), intent(in) :: theta(:)        !! th of the relaxing hinges [rad]
       real(wp), intent(out) :: theta_rate(:)  !! [rad/s]
+      integer :: i, k
 
-      theta_rate = (moment(law%relaxing) - law%stiffness(law%relaxing)*theta)/law%damping(law%relaxing)
+      do i = 1, size(law%relaxing)
+         k = law%relaxing(i)
+         theta_rate(i) = (moment(k) - law%stiffness(k)*theta(i))/law%damping(k)
+      end do
    end subroutine relaxation_rates
 
    !> A bound of the rates at which relaxing hinges follow [1/s]: (C + 1/F_min)/D, F_min the smallest eigenvalue of the
