@@ -11,6 +11,7 @@ module rodyn_notes
 
    integer, parameter :: most_dof = 600                   !! beyond, eigenvalues would cost more than they tell
    real(wp), parameter :: least_neglected = 1.0e-9_wp     !! smaller terms are not worth a word
+   character(len=*), parameter :: remedy = "; dampers = 'exact' keeps them"
 
 contains
 
@@ -32,18 +33,18 @@ contains
       if (len(text) > 0) text = text//new_line('a')
       if (term > huge(term)) then
          text = text//'quasistatic bending neglects terms (D w/C)^2 of the dampers: without bound at hinge '// &
-                to_text(hinge)//', which has a damper but no spring'
+                to_text(hinge)//', which has a damper but no spring'//remedy
          return
       end if
       write (digits, '(es8.1)') term
       text = text//'quasistatic bending neglects terms (D w/C)^2 of the dampers: up to '//trim(adjustl(digits))// &
              ' (hinge '//to_text(hinge)
       write (digits, '(es8.2)') frequency
-      text = text//', w = '//trim(adjustl(digits))//' rad/s)'
+      text = text//', w = '//trim(adjustl(digits))//' rad/s)'//remedy
    end function notes_on
 
    !> Largest (D w/C)^2 of the hinges, w the highest natural frequency, MODEL sec. 5: the relative size of what
-   !> quasistatic bending leaves out of the damping. Zero where nothing is left out or nobody looks.
+   !> quasistatic bending with reduced dampers leaves out. Zero where nothing is left out or nobody looks.
    subroutine neglected_damping(scene, q, term, hinge, frequency)
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: q(:)       !! coordinates (dof)
@@ -58,6 +59,7 @@ contains
       hinge = 0
       frequency = 0.0_wp
       if (.not. (scene%quasistatic .and. scene%hinges%has_damping) .or. scene%n_dof > most_dof) return
+      if (size(scene%hinges%relaxing) > 0) return
       call natural_frequencies(scene, q, frequencies, error)
       if (allocated(error)) return
       frequency = maxval(frequencies)
