@@ -40,6 +40,8 @@ SCENES = {
     "rigid": TIMES + SPACECRAFT + KINKED + "&model bending = 'rigid' /\n" + MOMENT,
     "lumped": TIMES + SPACECRAFT + CHAIN + LUMPED + MOMENT,
     "quasistatic": TIMES + SPACECRAFT + DAMPED + QUASISTATIC + MOMENT,
+    "quasistatic, exact, bdf": TIMES + SPACECRAFT + DAMPED + QUASISTATIC.replace(" /", ", dampers = 'exact' /") + MOMENT
+    + "&solver rtol = 1e-5, atol = 1e-7 /\n",
     "fixed": TIMES + FIXED + KINKED + FORCE,
     "paper, bdf, assembled": TIMES + SPACECRAFT + CHAIN + MOMENT + "&solver method = 'bdf', rtol = 1e-6, atol = 1e-8 /\n"
     + "&model formulation = 'paper', kernel = 'assembled' /\n",
@@ -383,7 +385,7 @@ def test_what_quasistatic_bending_leaves_out_is_noted(results, tmp_path):
     case = write_case(tmp_path, TIMES + FIXED + chain % damping + QUASISTATIC + "&initial phi = 0.1 /\n")
     note = printed(rodyn("run", case, cwd=tmp_path).stdout)["note"]
     value, hinge, w = re.fullmatch(r"quasistatic bending neglects terms \(D w/C\)\^2 of the dampers: "
-                                   r"up to (\S+) \(hinge (\d+), w = (\S+) rad/s\)", note).groups()
+                                   r"up to (\S+) \(hinge (\d+), w = (\S+) rad/s\); dampers = 'exact' keeps them", note).groups()
     assert float(value) == pytest.approx((damping*frequency/stiffness)**2, rel=0.05)
     assert float(w) == pytest.approx(frequency, rel=0.005)
     assert hinge == "0"
@@ -392,6 +394,9 @@ def test_what_quasistatic_bending_leaves_out_is_noted(results, tmp_path):
         assert file.attrs.get_id("notes").get_type().is_variable_str() is False
     assert "note" in printed(results["quasistatic"][1])
     case = write_case(tmp_path, TIMES + FIXED + chain % 1e-3 + QUASISTATIC, "weak.nml")  # below 1e-9
+    assert "note" not in printed(rodyn("run", case, cwd=tmp_path).stdout)
+    exact = QUASISTATIC.replace(" /", ", dampers = 'exact' /")
+    case = write_case(tmp_path, TIMES + FIXED + chain % damping + exact, "exact.nml")
     assert "note" not in printed(rodyn("run", case, cwd=tmp_path).stdout)
     loose = CHAIN.replace("2*4000 /", "0, 4000, hinge_damping = 0, 1, 1 /")
     case = write_case(tmp_path, TIMES + SPACECRAFT + loose + QUASISTATIC, "loose.nml")
@@ -512,7 +517,7 @@ def test_every_scene_gives_all_states_with_units(results, scene):
             assert (run[name].dims, run[name].units) == (dims, units), name
             assert run[name].long_name and run[name].dtype == np.float64, name
             assert np.all(np.isfinite(run[name])), name
-        slaved = {"quasistatic"}
+        slaved = {"quasistatic", "quasistatic, exact, bdf"}
         rigid = {"one rigid rod, fixed", "rigid", "lumped"}
         for name in ("alpha", "beta", "alpha_rate", "beta_rate"):
             assert bool(np.any(run[name])) == (scene not in rigid), name
