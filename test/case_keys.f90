@@ -192,7 +192,7 @@ contains
          'c.nml:3: &chain node_mass = -1: must not be negative [kg]'//nl//&
          'c.nml:3: &chain hinge_stiffness = -1: must not be negative [N m/rad]'//nl//&
          'c.nml:3: &chain hinge_damping = -1: must not be negative [N m s/rad]'//nl//&
-         'c.nml:4: &case n_outputs = 0: must be at least 1'//nl//&
+         'c.nml:4: &case n_outputs = 0: must lie in 1..100000000'//nl//&
          'c.nml:4: &case t_end = -1: must be positive [s]'//nl//&
          'c.nml:5: &model gauss_points = 201: must lie in 1..200'//nl//&
          'c.nml:6: &solver rtol = 1: must be greater than 0 and less than 1'//nl//&

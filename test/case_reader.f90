@@ -67,7 +67,7 @@ contains
    subroutine hinge_bounds(error)
       type(error_type), allocatable, intent(out) :: error
       type(case_config) :: config
-      call expect_accepted(error, spacecraft//'&chain n_rods = 3, length = 1, mass_per_length = 0,'//nl// &
+      call expect_accepted(error, spacecraft//'&chain n_rods = 3, length = 1, mass_per_length = 1,'//nl// &
          'bending_stiffness = 1, hinge_stiffness(0) = 7e3, hinge_stiffness(1:2) = 5e3 /', config)
       if (allocated(error)) return
       call check(error, lbound(config%chain%hinge_stiffness, 1), 0, 'first hinge')

@@ -1,7 +1,7 @@
 !> Rules that tie several keys of a case together.
 module test_case_rules
    use rodyn_errors, only: error_type
-   use test_case_support, only: expect_faults, nl, chain, valid
+   use test_case_support, only: expect_faults, nl, spacecraft, chain, valid
    use test_testing, only: new_test, unittest
    implicit none (type, external)
    private
@@ -29,6 +29,9 @@ contains
          new_test('a smooth step fits between start and end', rise_too_long), &
          new_test('a fixed step goes with erk only', fixed_step_adams), &
          new_test('no rule is applied to a key that is wrong itself', no_echo), &
+         new_test('rods that bend as motion need mass and two Gauss points', bending_needs_mass), &
+         new_test('a rod and its outer node are not both without mass', massless_rod), &
+         new_test('each method has its orders', orders), &
          new_test('a free spacecraft needs mass and inertia', free_needs_mass)]
    end subroutine collect_case_rules
 
@@ -198,5 +201,40 @@ contains
          'c.nml:2: &spacecraft inertia: is required when motion = ''free''')
    end subroutine free_needs_mass
 
+   subroutine bending_needs_mass(error)
+      type(error_type), allocatable, intent(out) :: error
+      call expect_faults(error, &
+         spacecraft//'&chain n_rods = 3, length = 1, mass_per_length = 2*1, 0, bending_stiffness = 1, hinge_stiffness = 1 /'//nl// &
+         '&model gauss_points = 1 /', &
+         'c.nml:2: &chain mass_per_length = 2*1, 0: must be positive when bending = ''dynamic'', but is 0 for rod 3'//nl// &
+         'c.nml:3: &model gauss_points = 1: must be at least 2 when bending = ''dynamic''')
+   end subroutine bending_needs_mass
+
+   subroutine massless_rod(error)
+      type(error_type), allocatable, intent(out) :: error
+      character(len=*), parameter :: rods = '&chain n_rods = 3, length = 1, hinge_stiffness = 1, mass_per_length = 1, 0, '
+      call expect_faults(error, &
+         spacecraft//rods//'0 /'//nl//'&model bending = ''rigid'', inertia = ''lumped'' /', &
+         'c.nml:2: &chain node_mass: rod 2 and its outer node are both without mass')
+      if (allocated(error)) return
+      call expect_faults(error, &
+         spacecraft//rods//'1 /'//nl//'&model bending = ''rigid'' /', &
+         'c.nml:2: &chain node_mass: rod 2 and its outer node are both without mass')
+   end subroutine massless_rod
+
+   subroutine orders(error)
+      type(error_type), allocatable, intent(out) :: error
+      call expect_faults(error, valid//'&solver order = 5 /', &
+         'c.nml:3: &solver order = 5: goes with a method that is named; ''auto'' chooses the order, too')
+      if (allocated(error)) return
+      call expect_faults(error, valid//'&solver method = ''bdf'', order = 6 /', &
+         'c.nml:3: &solver order = 6: must lie in 0..5 when method = ''bdf''')
+      if (allocated(error)) return
+      call expect_faults(error, valid//'&solver method = ''erk'', order = 1 /', &
+         'c.nml:3: &solver order = 1: must be 0 or lie in 2..8 when method = ''erk''')
+      if (allocated(error)) return
+      call expect_faults(error, valid//'&solver method = ''dop853'', order = 7 /', &
+         'c.nml:3: &solver order = 7: must be 0 or 8 when method = ''dop853''')
+   end subroutine orders
 
 end module test_case_rules

@@ -22,6 +22,7 @@ module rodyn_assembled
       real(wp), allocatable :: m(:, :)  !! M, or its Cholesky factor: lower triangle
       real(wp), allocatable :: n(:, :)  !! N (dof, size of z)
       real(wp), allocatable :: z(:)     !! z
+      real(wp), allocatable :: row(:)   !! row of w of M (dof)
       real(wp), allocatable :: static(:, :) !! S_k, first moment outboard (2, n) [kg m]
       real(wp), allocatable :: axial(:, :)  !! X_k, the same turned by -90 degrees (2, n) [kg m]
       real(wp), allocatable :: outboard(:)  !! mass beyond rod k (0:n) [kg]
@@ -43,7 +44,8 @@ contains
       n = scene%n
       n_dof = scene%n_dof
       allocate (system%k(n_dof, n_dof), system%d(n_dof, n_dof), system%m(n_dof, n_dof), system%n(n_dof, n_dof), &
-                system%z(n_dof), system%q2(n_dof), system%static(2, n), system%axial(2, n), system%outboard(0:n), &
+                system%z(n_dof), system%row(n_dof), system%q2(n_dof), &
+                system%static(2, n), system%axial(2, n), system%outboard(0:n), &
                 b(0:n - 1, n_dof), c(0:n - 1, n_dof), r(0:n - 1, n_dof), stat=status)
       if (status /= 0) then
          write (size_text, '(f0.1, " GiB")') 4.75_wp*8.0_wp*real(n_dof, wp)**2/1024.0_wp**3
@@ -297,10 +299,10 @@ contains
       type(assembled_system), intent(inout) :: system
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: sine(0:), cosine(0:)
-      real(wp) :: turned(2), row(scene%n_dof)
+      real(wp) :: turned(2), swung(2) !! of hinge 0; of all rods together
       integer :: k, x
 
-      associate (m => system%m, n => scene%n, chain => system%outboard(0), body => scene%body)
+      associate (m => system%m, row => system%row, n => scene%n, chain => system%outboard(0), body => scene%body)
          turned = [-body%hinge_y, body%hinge_x]
          do k = 1, n
             m(1:2, scene%phi_at() + k) = system%static(:, k)
@@ -315,15 +317,21 @@ contains
          do x = 4, scene%n_dof
             row(x) = dot_product(turned, m(1:2, x)) + sum(m(scene%phi_at() + 1:scene%phi_at() + n, x))
          end do
-         row(1:2) = chain*turned + [(sum(m(x, scene%phi_at() + 1:scene%phi_at() + n)), x=1, 2)]
+         do x = 1, 2
+            swung(x) = sum(m(x, scene%phi_at() + 1:scene%phi_at() + n))
+         end do
+         row(1:2) = chain*turned + swung
          row(3) = body%inertia + chain*dot_product(turned, turned) + &
-                  dot_product(turned, [(sum(m(x, scene%phi_at() + 1:scene%phi_at() + n)), x=1, 2)]) + &
-                  sum(row(scene%phi_at() + 1:scene%phi_at() + n))
+                  dot_product(turned, swung) + sum(row(scene%phi_at() + 1:scene%phi_at() + n))
          m(1, 1) = body%mass + chain
          m(2, 2) = body%mass + chain
          m(1:2, 3) = row(1:2)
          m(3, :) = row
-         m(:, 1:3) = transpose(m(1:3, :))
+         do k = 1, 3
+            do x = 1, scene%n_dof
+               m(x, k) = m(k, x)
+            end do
+         end do
       end associate
    end subroutine add_spacecraft_rows
 
@@ -345,22 +353,13 @@ contains
          nm(:, 1) = m(:, 2)  ! w Vx accelerates everything along y
          nm(:, 2) = -m(:, 1) ! w Vy along -x
          ! w^2: hinge 0 falls towards C, and every rod turns with w.
-         nm(:, 3) = -(body%hinge_x*chain_column(1) + body%hinge_y*chain_column(2))
+         nm(:, 3) = -(body%hinge_x*m(:, 1) + body%hinge_y*m(:, 2))
+         nm(1, 3) = -(body%hinge_x*(m(1, 1) - body%mass) + body%hinge_y*m(1, 2)) ! C itself does not fall
+         nm(2, 3) = -(body%hinge_x*m(2, 1) + body%hinge_y*(m(2, 2) - body%mass))
          do k = 1, scene%n
             nm(:, 3) = nm(:, 3) + nm(:, scene%phi_at() + k)
          end do
       end associate
-
-   contains
-
-      !> Inertia force of the chain, without the spacecraft, for a unit acceleration of hinge 0 along x or y.
-      pure function chain_column(axis) result(column)
-         integer, intent(in) :: axis
-         real(wp) :: column(scene%n_dof)
-         column = system%m(:, axis)
-         column(axis) = column(axis) - scene%body%mass
-      end function chain_column
-
    end subroutine gyration_matrix
 
    !> Column of phi_i'(2 w + phi_i') (and of W_i^2): points of rod i accelerate by -(s e + v n), all beyond by -l e.
@@ -396,7 +395,8 @@ contains
                nm(scene%beta_at() + i, column) = -(inertia%ab*alpha + inertia%bb*beta)
             end associate
          end if
-         if (scene%n_base > 0) call close_column(system, scene, column, -system%axial(:, i))
+         inward = -system%axial(:, i) ! now of all that lies outboard
+         if (scene%n_base > 0) call close_column(system, scene, column, inward)
       end associate
    end subroutine centrifugal_column
 

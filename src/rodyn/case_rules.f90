@@ -22,6 +22,7 @@ contains
       call check_spacecraft(checked, config)
       call check_model(checked, config)
       call check_bending(checked, config)
+      call check_masses(checked, config)
       call check_solver(checked, config)
       do i = 1, size(config%loads)
          call check_target(checked, i, config%loads(i), config%chain%n_rods)
@@ -119,13 +120,75 @@ contains
 
    end subroutine check_bending
 
+   !> What moves has mass: the shapes of a rod that bends as motion, and every node or the rod before it.
+   subroutine check_masses(checked, config)
+      type(checked_document), intent(inout) :: checked
+      type(case_config), intent(in) :: config
+      real(wp), allocatable :: mass(:)
+
+      if (.not. (is_sound(checked, 'model', 1, 'bending') .and. is_sound(checked, 'model', 1, 'inertia'))) return
+      if (config%model%bending == 'dynamic') then
+         if (is_sound(checked, 'model', 1, 'gauss_points') .and. config%model%gauss_points < 2) &
+            call blame(checked, 'model', 1, 'gauss_points', "must be at least 2 when bending = 'dynamic'")
+      end if
+      if (.not. sound_chain('mass_per_length')) return
+      mass = config%chain%mass_per_length
+      if (config%model%bending == 'dynamic') then
+         if (any(mass <= 0.0_wp)) call blame(checked, 'chain', 1, 'mass_per_length', &
+            "must be positive when bending = 'dynamic', but is 0 for rod "//to_text(findloc(mass <= 0.0_wp, .true., 1)))
+         return
+      end if
+      if (.not. is_sound(checked, 'chain', 1, 'node_mass') .or. size(config%chain%node_mass) /= size(mass)) return
+      if (config%model%inertia == 'lumped') mass(:size(mass) - 1) = mass(:size(mass) - 1) + mass(2:) ! half of each to a node
+      mass = mass + config%chain%node_mass
+      if (any(mass <= 0.0_wp)) call blame(checked, 'chain', 1, 'node_mass', &
+         'rod '//to_text(findloc(mass <= 0.0_wp, .true., 1))//' and its outer node are both without mass')
+
+   contains
+
+      !> Given rightly, one for each rod?
+      logical function sound_chain(key)
+         character(len=*), intent(in) :: key
+         sound_chain = .false.
+         if (config%chain%n_rods < 1) return
+         if (.not. is_sound(checked, 'chain', 1, key) .or. .not. given(checked, 'chain', 1, key)) return
+         sound_chain = size(config%chain%mass_per_length) == config%chain%n_rods
+      end function sound_chain
+
+   end subroutine check_masses
+
+   !> Each method has its orders; only some take fixed steps.
    subroutine check_solver(checked, config)
       type(checked_document), intent(inout) :: checked
       type(case_config), intent(in) :: config
+      character(len=:), allocatable :: rule
+
       if (.not. is_sound(checked, 'solver', 1, 'method')) return
+      rule = order_rule(config%solver%method, config%solver%order)
+      if (len(rule) > 0 .and. is_sound(checked, 'solver', 1, 'order')) call blame(checked, 'solver', 1, 'order', rule)
       if (config%solver%fixed_step <= 0.0_wp .or. any(config%solver%method == ['erk   ', 'dop853'])) return
       call blame(checked, 'solver', 1, 'fixed_step', "is possible with method = 'erk' or 'dop853' only")
    end subroutine check_solver
+
+   !> What a method says against an order; empty if nothing.
+   pure function order_rule(method, order) result(rule)
+      character(len=*), intent(in) :: method
+      integer, intent(in) :: order !! 0: the method's own choice
+      character(len=:), allocatable :: rule
+
+      rule = ''
+      select case (method)
+      case ('auto')
+         if (order /= 0) rule = "goes with a method that is named; 'auto' chooses the order, too"
+      case ('bdf')
+         if (order > 5) rule = "must lie in 0..5 when method = 'bdf'"
+      case ('erk')
+         if (order == 1 .or. order > 8) rule = "must be 0 or lie in 2..8 when method = 'erk'"
+      case ('dop853')
+         if (order /= 0 .and. order /= 8) rule = "must be 0 or 8 when method = 'dop853'"
+      case default ! 'adams' takes what the table allows
+      end select
+   end function order_rule
 
    !> A load on a node needs an existing node and is a force.
    subroutine check_target(checked, i, load, n_rods)

@@ -24,7 +24,7 @@ module rodyn_case_schema
          help='title of the case'), &
       schema_row('case', 't_end', type_real, unit='s', default='1.0', rule=positive, &
          help='end of the simulated time, which begins at 0'), &
-      schema_row('case', 'n_outputs', type_integer, default='1000', rule=at_least, low=1.0_wp, &
+      schema_row('case', 'n_outputs', type_integer, default='1000', rule=in_range, low=1.0_wp, high=1.0e8_wp, &
          help='output intervals: n_outputs + 1 rows'), &
       schema_row('spacecraft', 'mass', type_real, unit='kg', default='depends', rule=positive, example='122.5', &
          when="required when motion = 'free'", help='mass M0'), &
@@ -116,7 +116,7 @@ module rodyn_case_schema
       schema_row('solver', 'atol', type_real, default='1.0e-10', rule=positive, &
          help='absolute tolerance of all states; zero would leave states at rest without a scale'), &
       schema_row('solver', 'order', type_integer, default='0', rule=in_range, low=0.0_wp, high=12.0_wp, &
-         help='highest order; 0: the choice of the method'), &
+         help="highest order, with a method named; 0: the choice of the method"), &
       schema_row('solver', 'max_step', type_real, unit='s', default='0.0', rule=not_negative, &
          help='longest step; 0: no bound'), &
       schema_row('solver', 'fixed_step', type_real, unit='s', default='0.0', rule=not_negative, &

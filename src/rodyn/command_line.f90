@@ -1,10 +1,11 @@
 !> The commands of the program, SPEC "Commands".
 module rodyn_command_line
-   use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
+   use, intrinsic :: iso_fortran_env, only: error_unit
    use rodyn_errors, only: error_type, raise, exit_done, exit_bad_input
    use rodyn_case_config, only: case_config
    use rodyn_case_reader, only: read_case, default_case
    use rodyn_run, only: run_case
+   use rodyn_posix, only: same_path, write_output
    use rodyn_build_info, only: program_version, git_commit
    implicit none (type, external)
    private
@@ -37,7 +38,7 @@ contains
          call read_options(options, error)
          if (.not. allocated(error)) then
             if (options%help) then
-               write (output_unit, '(a)') help_text(command)
+               call print_text(help_text(command), error)
             else if (command == 'run') then
                call run_file_command(options, error)
             else
@@ -47,9 +48,9 @@ contains
       case ('defaults')
          call defaults_command(error)
       case ('--version')
-         write (output_unit, '(a)') 'rodyn '//program_version//' ('//git_commit//')'
+         call print_text('rodyn '//program_version//' ('//git_commit//')', error)
       case ('--help', '-h', 'help')
-         write (output_unit, '(a)') help_text('')
+         call print_text(help_text(''), error)
       case ('')
          call raise(error, help_text(''), exit_bad_input)
       case default
@@ -61,17 +62,30 @@ contains
       exit_code = error%exit_code
    end subroutine run_command
 
+   !> Print what a command was asked for. That it could not be written is a failure.
+   subroutine print_text(text, error)
+      character(len=*), intent(in) :: text !! without the closing newline
+      type(error_type), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: failure
+      failure = write_output(text//nl)
+      if (len(failure) > 0) call raise(error, 'rodyn: standard output cannot be written: '//failure)
+   end subroutine print_text
+
    !> rodyn run
    subroutine run_file_command(options, error)
       type(options_type), intent(in) :: options
       type(error_type), allocatable, intent(out) :: error
       type(case_config) :: config
-      character(len=:), allocatable :: text
+      character(len=:), allocatable :: text, path
 
       call read_case(options%file, config, text, error)
       if (allocated(error)) return
-      call run_case(config, output_path(options, config), error, input_text=text, force=options%force, &
-                    quiet=options%quiet)
+      path = output_path(options, config)
+      if (same_path(path, options%file)) then
+         call raise(error, path//': is the case itself; give the result another name by --output', exit_bad_input)
+         return
+      end if
+      call run_case(config, path, error, input_text=text, force=options%force, quiet=options%quiet)
    end subroutine run_file_command
 
    !> rodyn check
@@ -82,21 +96,26 @@ contains
       character(len=:), allocatable :: text
 
       call read_case(options%file, config, text, error)
-      if (.not. allocated(error) .and. .not. options%quiet) write (output_unit, '(a)') options%file//': valid'
+      if (.not. allocated(error) .and. .not. options%quiet) call print_text(options%file//': valid', error)
    end subroutine check_command
 
    !> rodyn defaults [run]
    subroutine defaults_command(error)
       type(error_type), allocatable, intent(out) :: error
-      character(len=:), allocatable :: kind
+      character(len=:), allocatable :: kind, text
 
       kind = 'run'
       if (command_argument_count() > 1) kind = argument(2)
       select case (kind)
       case ('run')
-         write (output_unit, '(a)', advance='no') default_case()
+         if (command_argument_count() > 2) then
+            call raise(error, "rodyn defaults: '"//argument(3)//"' is too much", exit_bad_input)
+            return
+         end if
+         text = default_case()
+         call print_text(text(:len(text) - 1), error) ! its last newline is print_text's
       case ('--help', '-h')
-         write (output_unit, '(a)') help_text('defaults')
+         call print_text(help_text('defaults'), error)
       case default
          call raise(error, "rodyn defaults: '"//kind//"' is not one of: run", exit_bad_input)
       end select
@@ -137,18 +156,18 @@ contains
          if (word == '--help' .or. word == '-h') then
             options%help = .true.
             return
-         else if (word == '--force') then
+         else if (word == '--force' .and. argument(1) == 'run') then
             options%force = .true.
          else if (word == '--quiet') then
             options%quiet = .true.
-         else if (word == '--output' .or. word == '-o') then
+         else if ((word == '--output' .or. word == '-o') .and. argument(1) == 'run') then
             i = i + 1
             if (i > command_argument_count()) then
                call raise(error, 'rodyn '//argument(1)//': --output needs a file name', exit_bad_input)
                return
             end if
             options%output = argument(i)
-         else if (index(word, '--output=') == 1) then
+         else if (index(word, '--output=') == 1 .and. argument(1) == 'run') then
             options%output = word(len('--output=') + 1:)
          else if (index(word, '-') == 1 .and. len(word) > 1) then
             call raise(error, 'rodyn '//argument(1)//": there is no option '"//word//"'", exit_bad_input)

@@ -11,7 +11,8 @@ module rodyn_hinge_law
    use rodyn_three_moments, only: three_moments, new_three_moments
    implicit none (type, external)
    private
-   public :: hinge_law, new_hinge_law, hinge_moments, hinge_state, hinge_tangent, openings, relaxation_rates, initial_joints
+   public :: hinge_law, new_hinge_law, hinge_moments, hinge_state, hinge_rates, hinge_tangent, openings, relaxation_rates, &
+      initial_joints
 
    !> Springs, dampers and kinks of hinges 0..n-1.
    type :: hinge_law
@@ -212,8 +213,12 @@ contains
       real(wp), intent(in) :: moment(0:)      !! T (0:n) [N m]
       real(wp), intent(in) :: theta(:)        !! th of the relaxing hinges [rad]
       real(wp), intent(out) :: theta_rate(:)  !! [rad/s]
+      integer :: i, k
 
-      theta_rate = (moment(law%relaxing) - law%stiffness(law%relaxing)*theta)/law%damping(law%relaxing)
+      do i = 1, size(law%relaxing)
+         k = law%relaxing(i)
+         theta_rate(i) = (moment(k) - law%stiffness(k)*theta(i))/law%damping(k)
+      end do
    end subroutine relaxation_rates
 
    !> A bound of the rates at which relaxing hinges follow [1/s]: (C + 1/F_min)/D, F_min the smallest eigenvalue of the
@@ -287,6 +292,18 @@ contains
       theta_rate = 0.0_wp
       theta_rate(law%relaxing) = rate
    end subroutine relaxing_state
+
+   !> Rates th' of the joint rotations alone, where no hinge is relaxing.
+   pure subroutine hinge_rates(law, n, flexible, angle_rate, theta_rate)
+      type(hinge_law), intent(in) :: law
+      integer, intent(in) :: n
+      logical, intent(in) :: flexible
+      real(wp), intent(in) :: angle_rate(*)
+      real(wp), intent(out) :: theta_rate(0:n - 1) !! th' [rad/s]
+
+      call openings(n, flexible, angle_rate, theta_rate)
+      if (law%quasistatic) call law%series%solve(theta_rate)
+   end subroutine hinge_rates
 
    !> Change of the hinge moments for a change of angles and rates (the law is linear but for the kinks).
    pure subroutine hinge_tangent(law, n, flexible, d_angle, d_angle_rate, work, d_moment)

@@ -2,11 +2,11 @@
 module rodyn_kinematics
    use rodyn_kinds, only: wp
    use rodyn_scene, only: scene_type
-   use rodyn_hinge_law, only: hinge_state, openings
+   use rodyn_hinge_law, only: hinge_state, hinge_rates, openings
    use rodyn_three_moments, only: slopes_from_moments
    implicit none (type, external)
    private
-   public :: invariants_type, invariants, load_power, dissipated_power, slopes, kinetic_energy
+   public :: invariants_type, invariants, load_power, damper_power, dissipated_power, slopes, kinetic_energy
 
    !> What the ledger records of a state. Momenta along inertial axes, angular momentum about their origin.
    type :: invariants_type
@@ -195,6 +195,22 @@ contains
       end associate
       dissipated_power = sum(scene%hinges%damping*theta_rate**2)
    end function dissipated_power
+
+   !> The same with memory of the caller's, for the right-hand side of scenes without relaxing hinges.
+   pure subroutine damper_power(scene, p, rate, power)
+      type(scene_type), intent(in) :: scene
+      real(wp), intent(in) :: p(:)
+      real(wp), intent(inout) :: rate(0:) !! workspace (0:n-1): th' [rad/s]
+      real(wp), intent(out) :: power      !! [W]
+      integer :: k
+
+      power = 0.0_wp
+      if (.not. scene%hinges%has_damping) return
+      call hinge_rates(scene%hinges, scene%n, scene%dynamic_bending, p(scene%n_base + 1:), rate)
+      do k = 0, scene%n - 1
+         power = power + scene%hinges%damping(k)*rate(k)**2
+      end do
+   end subroutine damper_power
 
    !> Power of the loads on the spacecraft and on the nodes [W].
    pure real(wp) function load_power(scene, q, p, base_force, loaded, node_force)

@@ -28,13 +28,13 @@ module rodyn_method_choice
 contains
 
    !> The user's method, or the one that fits.
-   subroutine choose_method(choice, solver, scene, q, t_end, error)
+   subroutine choose_method(choice, solver, scene, q, t_end)
       type(method_choice), intent(out) :: choice
       type(solver_config), intent(in) :: solver
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: q(:)  !! initial coordinates (dof)
       real(wp), intent(in) :: t_end !! [s]
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable :: unknown
       real(wp), allocatable :: frequency(:), decay(:)
       real(wp) :: lowest, highest, fastest
 
@@ -46,15 +46,17 @@ contains
          choice%reason = 'auto: explicit, order 8 (too many unknowns for a look at the frequencies)'
          return
       end if
-      call natural_frequencies(scene, q, frequency, error)
-      if (allocated(error)) return
+      call natural_frequencies(scene, q, frequency, unknown)
+      if (allocated(unknown)) then
+         choice%reason = 'auto: explicit, order 8 ('//unknown%message//')'
+         return
+      end if
       highest = maxval(frequency)
       lowest = minval(frequency, mask=frequency > 1.0e-6_wp*highest)
       fastest = 0.0_wp
       if (scene%hinges%has_damping) then
-         call decay_rates(scene, q, decay, error)
-         if (allocated(error)) return
-         fastest = max(maxval(decay), scene%hinges%fastest_relaxation())
+         call decay_rates(scene, q, decay, unknown)
+         if (.not. allocated(unknown)) fastest = max(maxval(decay), scene%hinges%fastest_relaxation())
       end if
       choice%reason = 'auto: frequencies '//short(lowest)//' to '//short(highest)//' rad/s'
       if (.not. highest > 0.0_wp) choice%reason = 'auto: no vibrations'

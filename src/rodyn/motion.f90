@@ -12,7 +12,7 @@ module rodyn_motion
    use rodyn_accelerations, only: dynamics_type, new_dynamics
    use rodyn_assembled, only: assembled_system, new_assembled_system, mass_matrix
    use rodyn_linearisation, only: balance_tangent
-   use rodyn_kinematics, only: load_power, dissipated_power, invariants_type, invariants
+   use rodyn_kinematics, only: load_power, damper_power, dissipated_power, invariants_type, invariants
    use rodyn_hinge_law, only: relaxation_rates, initial_joints, hinge_tangent
    use rodyn_lapack, only: dpotrf, dpotrs
    implicit none (type, external)
@@ -88,6 +88,7 @@ contains
       real(wp), contiguous, intent(in) :: y(:)
       real(wp), contiguous, intent(out) :: ydot(:)
       logical, intent(out) :: ok
+      integer :: i
 
       associate (r => self%n_q, m => self%n_dof)
          call self%dynamics%accelerations(t, y(1:r), y(r + 1:r + m), ydot(r + 1:r + m), ok)
@@ -100,7 +101,16 @@ contains
          if (.not. self%ledger) return
          ydot(r + m + 1) = load_power(self%dynamics%scene, y(1:r), y(r + 1:r + m), self%dynamics%forces%base, &
                                       self%dynamics%regime%on_nodes, self%dynamics%forces%node)
-         ydot(r + m + 2) = dissipated_power(self%dynamics%scene, y(1:r), y(r + 1:r + m))
+         if (r > m) then
+            associate (d => self%dynamics%scene%hinges%damping, relaxing => self%dynamics%scene%hinges%relaxing)
+               ydot(r + m + 2) = 0.0_wp
+               do i = 1, r - m
+                  ydot(r + m + 2) = ydot(r + m + 2) + d(relaxing(i))*ydot(m + i)**2
+               end do
+            end associate
+         else
+            call damper_power(self%dynamics%scene, y(r + 1:r + m), self%dynamics%work%theta, ydot(r + m + 2))
+         end if
       end associate
    end subroutine rhs
 

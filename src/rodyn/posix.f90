@@ -3,13 +3,13 @@
 !> Calls that can fail return the reason as text, empty on success, so that callers word their own messages.
 module rodyn_posix
    use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_funptr, c_int, c_intptr_t, &
-      c_long, c_null_char, c_null_funptr, c_ptr, c_size_t
+      c_long, c_null_char, c_null_funptr, c_null_ptr, c_ptr, c_size_t
    implicit none (type, external)
    private
    public :: process_id, host_name, utc_now
-   public :: path_exists, is_directory, is_writable, parent_directory
+   public :: path_exists, same_path, is_directory, is_writable, parent_directory
    public :: sync_path, rename_over, rename_new, remove_file
-   public :: ignore_file_size_signal
+   public :: ignore_file_size_signal, write_output
 
    integer(c_int), parameter :: f_ok = 0, w_ok = 2, x_ok = 1               ! <unistd.h>
    integer(c_int), parameter :: o_rdonly = 0                               ! <fcntl.h>
@@ -33,6 +33,15 @@ module rodyn_posix
       end function posix_gethostname
 
       ! variadic in C; without its third argument the call is an ordinary one
+      function posix_write(descriptor, bytes, count) result(written) bind(c, name='write')
+         import :: c_char, c_int, c_intptr_t, c_size_t
+         implicit none (type, external)
+         integer(c_int), intent(in), value :: descriptor
+         character(kind=c_char), intent(in) :: bytes(*)
+         integer(c_size_t), intent(in), value :: count
+         integer(c_intptr_t) :: written
+      end function posix_write
+
       function posix_open(path, flags) result(descriptor) bind(c, name='open')
          import :: c_char, c_int
          implicit none (type, external)
@@ -62,6 +71,28 @@ module rodyn_posix
          integer(c_int), value :: mode
          integer(c_int) :: status
       end function posix_access
+
+      !> The path without links and dots, in memory the caller frees; null if there is no such file.
+      function posix_realpath(path, buffer) result(resolved) bind(c, name='realpath')
+         import :: c_char, c_ptr
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+         type(c_ptr), intent(in), value :: buffer !! null
+         type(c_ptr) :: resolved
+      end function posix_realpath
+
+      function posix_strcmp(a, b) result(order) bind(c, name='strcmp')
+         import :: c_int, c_ptr
+         implicit none (type, external)
+         type(c_ptr), intent(in), value :: a, b
+         integer(c_int) :: order
+      end function posix_strcmp
+
+      subroutine posix_free(address) bind(c, name='free')
+         import :: c_ptr
+         implicit none (type, external)
+         type(c_ptr), intent(in), value :: address
+      end subroutine posix_free
 
       function posix_opendir(path) result(stream) bind(c, name='opendir')
          import :: c_char, c_ptr
@@ -190,6 +221,20 @@ contains
       exists = posix_access(path//c_null_char, f_ok) == 0
    end function path_exists
 
+   !> Do two paths name one existing file, by whatever links and dots?
+   function same_path(a, b) result(same)
+      character(len=*), intent(in) :: a, b
+      logical :: same
+      type(c_ptr) :: whole_a, whole_b
+
+      whole_a = posix_realpath(a//c_null_char, c_null_ptr)
+      whole_b = posix_realpath(b//c_null_char, c_null_ptr)
+      same = c_associated(whole_a) .and. c_associated(whole_b)
+      if (same) same = posix_strcmp(whole_a, whole_b) == 0
+      if (c_associated(whole_a)) call posix_free(whole_a)
+      if (c_associated(whole_b)) call posix_free(whole_b)
+   end function same_path
+
    !> Is this a directory that can be read?
    function is_directory(path) result(directory)
       character(len=*), intent(in) :: path
@@ -293,6 +338,27 @@ contains
       type(c_funptr) :: previous
       previous = posix_signal(sigxfsz, transfer(sig_ign, c_null_funptr))
    end subroutine ignore_file_size_signal
+
+   !> Write to standard output at once. (Fortran's own units notice a full disk or a closed output too late, or never.)
+   function write_output(text) result(failure)
+      character(len=*), intent(in) :: text
+      character(len=:), allocatable :: failure !! empty on success
+      integer(c_int), parameter :: standard_output = 1, eintr = 4
+      integer(c_intptr_t) :: written
+      integer :: done
+
+      failure = ''
+      done = 0
+      do while (done < len(text))
+         written = posix_write(standard_output, text(done + 1:), int(len(text) - done, c_size_t))
+         if (written > 0) then
+            done = done + int(written)
+         else if (errno() /= eintr) then
+            failure = last_failure()
+            return
+         end if
+      end do
+   end function write_output
 
    !> Why the last call failed.
    function last_failure() result(text)

@@ -42,7 +42,7 @@ contains
       integer :: k, ip, ia, ib
       real(wp) :: omega, omega_rate, w, w2, lw2, w_rate, alpha, beta, qa, qb
       real(wp) :: mv, mv_rate, mvv, mvv_rate, d, arm, outer, central, r0, gq, hq
-      real(wp) :: pee, pen, pnn, det, be, bn, mu, inv, ce, cn, r, ee, en, nn, cd, sd, ae, an, smallest
+      real(wp) :: pee, pen, pnn, det, be, bn, mu, inv, ce, cn, r, ee, en, nn, cd, sd, ae, an, smallest, base_smallest
 
       ip = n_base
       ia = n_base + n
@@ -137,7 +137,7 @@ contains
       end do inward
 
       call spacecraft_accelerations(n_base, body, p, node_mass(0), pee, pen, pnn, det, be, bn, moment(0), &
-                                    base_force, acceleration, ae, an)
+                                    base_force, acceleration, ae, an, base_smallest)
       omega_rate = 0.0_wp
       if (n_base > 0) omega_rate = acceleration(3)
 
@@ -156,7 +156,7 @@ contains
             an = an + length*w_rate
          end associate
       end do
-      ok = ieee_is_finite(an) .and. smallest > 0.0_wp
+      ok = ieee_is_finite(an) .and. smallest > 0.0_wp .and. base_smallest > 0.0_wp
    end subroutine flexible_accelerations
 
 end module rodyn_recursion_flexible

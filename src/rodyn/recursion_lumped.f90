@@ -34,7 +34,7 @@ contains
       logical, intent(out) :: ok                    !! false: not finite
 
       integer :: k
-      real(wp) :: omega, omega_rate, lw2, a, be, bn, mu, inv, shear, ratio, cd, sd, ae, an, outer_an, r
+      real(wp) :: omega, omega_rate, lw2, a, be, bn, mu, inv, shear, ratio, cd, sd, ae, an, outer_an, r, base_smallest
 
       omega = 0.0_wp
       if (n_base > 0) omega = p(3)
@@ -74,7 +74,7 @@ contains
       end do inward
 
       call spacecraft_accelerations(n_base, body, p, node_mass(0), a*cd**2, a*cd*sd, a*sd**2, 0.0_wp, be, bn, &
-                                    moment(0), base_force, acceleration, ae, an)
+                                    moment(0), base_force, acceleration, ae, an, base_smallest)
       omega_rate = 0.0_wp
       if (n_base > 0) omega_rate = acceleration(3)
 

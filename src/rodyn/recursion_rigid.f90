@@ -33,7 +33,7 @@ contains
 
       integer :: k
       real(wp) :: omega, omega_rate, w2, lw2, w_rate, d, r0
-      real(wp) :: pee, pen, pnn, det, be, bn, mu, inv, cn, r, ee, en, nn, cd, sd, ae, an
+      real(wp) :: pee, pen, pnn, det, be, bn, mu, inv, cn, r, ee, en, nn, cd, sd, ae, an, base_smallest
 
       omega = 0.0_wp
       if (n_base > 0) omega = p(3)
@@ -93,7 +93,7 @@ contains
       end do inward
 
       call spacecraft_accelerations(n_base, body, p, node_mass(0), pee, pen, pnn, det, be, bn, moment(0), &
-                                    base_force, acceleration, ae, an)
+                                    base_force, acceleration, ae, an, base_smallest)
       omega_rate = 0.0_wp
       if (n_base > 0) omega_rate = acceleration(3)
 

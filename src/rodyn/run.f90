@@ -16,6 +16,7 @@ module rodyn_run
    use rodyn_run_file, only: run_file, run_header, run_row, solver_report, new_run_row, check_output_path
    use rodyn_progress, only: progress_monitor, new_progress
    use rodyn_description, only: describe_scene
+   use rodyn_notes, only: notes_on
    implicit none (type, external)
    private
    public :: run_case
@@ -68,11 +69,12 @@ contains
       if (.not. allocated(error)) call new_motion(motion, scene, config%output%ledger, error)
       if (allocated(error)) return
       call initial_state(motion, config%initial, y)
-      call choose_method(choice, config%solver, scene, y(:scene%n_dof), config%t_end, error)
-      if (allocated(error)) return
+      call choose_method(choice, config%solver, scene, y(:scene%n_dof), config%t_end)
+      header%notes = notes_on(scene, y(:scene%n_dof), config%output%ledger)
       if (.not. silent) then
          write (output_unit, '(a)') describe_scene(scene, config%output%ledger)
          write (output_unit, '(a)') 'method  '//choice%method//': '//choice%reason
+         call print_notes(header%notes)
       end if
       call new_integrator(integrator, motion, choice%method, options_of(config), error)
       if (allocated(error)) return
@@ -97,8 +99,8 @@ contains
       call system_clock(clock_end)
       call close_file(recorder%file, integrator, choice, config, scene, failure, &
                       real(clock_end - clock_start, wp)/real(clock_rate, wp), error)
-      if (.not. silent .and. .not. allocated(error)) call print_result(integrator, recorder, path, config, t, &
-                                                                        real(clock_end - clock_start, wp)/real(clock_rate, wp))
+      if (.not. silent .and. .not. allocated(error)) &
+         call print_result(integrator, recorder, path, config, t, real(clock_end - clock_start, wp)/real(clock_rate, wp), failure)
       call integrator%finalize()
       if (allocated(error)) return
       if (allocated(failure)) then
@@ -176,18 +178,38 @@ contains
       end if
    end subroutine close_file
 
+   !> Each note on a line of its own.
+   subroutine print_notes(notes)
+      character(len=*), intent(in) :: notes !! lines
+      integer :: first, last
+
+      first = 1
+      do while (first <= len(notes))
+         last = index(notes(first:), new_line('a')) + first - 2
+         if (last < first) last = len(notes)
+         write (output_unit, '(a)') 'note    '//notes(first:last)
+         first = last + 2
+      end do
+   end subroutine print_notes
+
    !> Last lines on the terminal.
-   subroutine print_result(integrator, recorder, path, config, t, seconds)
+   subroutine print_result(integrator, recorder, path, config, t, seconds, failure)
       class(integrator_type), intent(inout) :: integrator
       type(recorder_type), intent(in) :: recorder
       character(len=*), intent(in) :: path
       type(case_config), intent(in) :: config
       real(wp), intent(in) :: t, seconds
+      type(error_type), allocatable, intent(in) :: failure !! why the run ended early
       type(solver_statistics) :: stats
+      character(len=8) :: outcome
+      character(len=24) :: duration
 
       stats = integrator%statistics()
-      write (output_unit, '(a, i0, a, i0, a, f0.3, a)') 'done    t = '//time_text(t)//' s, ', stats%n_steps, ' steps, ', &
-         stats%n_rhs, ' right-hand sides, ', seconds, ' s'
+      outcome = 'done'
+      if (allocated(failure)) outcome = merge('stopped', 'failed ', failure%exit_code == exit_stopped)
+      write (duration, '(f20.3)') seconds
+      write (output_unit, '(a, i0, a, i0, a)') outcome//'t = '//time_text(t)//' s, ', stats%n_steps, ' steps, ', &
+         stats%n_rhs, ' right-hand sides, '//trim(adjustl(duration))//' s'
       if (config%output%ledger) write (output_unit, '(a, es8.1, a, es8.1, a)') 'ledger  largest energy residual ', &
          recorder%worst_residual, ' J of ', recorder%energy_scale, ' J'
       write (output_unit, '(a)') 'file    '//path

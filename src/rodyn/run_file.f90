@@ -31,6 +31,7 @@ module rodyn_run_file
       character(len=:), allocatable :: title
       character(len=:), allocatable :: input            !! the namelist as read
       character(len=:), allocatable :: resolved_input   !! every key with the value used
+      character(len=:), allocatable :: notes            !! what to know about the model, one line each
       character(len=:), allocatable :: sundials_version
       integer :: n_rods = 0       !! n
       integer :: n_rows = 0       !! rows to expect; 0: unknown. Only sizes the blocks
@@ -336,6 +337,7 @@ contains
       call put('created', utc_now())
       call put('input', text_or_empty(header%input))
       call put('resolved_input', text_or_empty(header%resolved_input))
+      call put('notes', text_or_empty(header%notes))
 
    contains
 

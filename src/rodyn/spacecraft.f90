@@ -25,7 +25,7 @@ contains
    !> sums of positive terms on the left, for a light spacecraft on a heavy chain as for the reverse, and two
    !> divisions that need not wait for each other.
    pure subroutine spacecraft_accelerations(n_base, body, p, hinge_mass, pee, pen, pnn, det, be, bn, moment_0, force, &
-                                            acceleration, ax, ay)
+                                            acceleration, ax, ay, smallest)
       integer, intent(in) :: n_base               !! 3: free, 0: fixed
       type(spacecraft_body), intent(in) :: body
       real(wp), intent(in) :: p(*)                !! Vx, Vy, w, ... of a free spacecraft
@@ -37,10 +37,12 @@ contains
       real(wp), intent(in) :: force(3)            !! X_C, Y_C, M_C
       real(wp), intent(inout) :: acceleration(*)  !! first three: Vx', Vy', w'
       real(wp), intent(out) :: ax, ay             !! acceleration of hinge 0, moving axes [m/s^2]
-      real(wp) :: pxx, pyy, d, d2, inverse, cx, cy, px, py, w, w2, m11, m22, gx, gy, fx, fy, w_rate
+      real(wp), intent(out) :: smallest           !! not positive: the mass matrix is not positive definite
+      real(wp) :: pxx, pyy, d, d2, d3, inverse, cx, cy, px, py, w, w2, m11, m22, gx, gy, fx, fy, w_rate
 
       ax = 0.0_wp
       ay = 0.0_wp
+      smallest = huge(1.0_wp)
       if (n_base == 0) return
       w = p(3)
       w2 = w*w
@@ -58,8 +60,9 @@ contains
          py = pyy*x - pen*y
          gx = mass*((pxx*force(1) + pen*force(2)) + (m22*cx - pen*cy)) + d*force(1)
          gy = mass*((pen*force(1) + pyy*force(2)) + (m11*cy - pen*cx)) + d*force(2)
-         w_rate = ((force(3) + moment_0)*d2 - (x*gy - y*gx))/ &
-                  (body%inertia*d2 + mass*(mass*(x*py - y*px) + d*(x*x + y*y)))
+         d3 = body%inertia*d2 + mass*(mass*(x*py - y*px) + d*(x*x + y*y))
+         smallest = min(m11, d2, d3)
+         w_rate = ((force(3) + moment_0)*d2 - (x*gy - y*gx))/d3
          fx = (force(1) - cx) - px*w_rate
          fy = (force(2) - cy) - py*w_rate
          ax = (m22*fx - pen*fy)*inverse

@@ -1,0 +1,88 @@
+!> What the reader of a result should know about the model behind it; for the terminal and the run file.
+module rodyn_notes
+   use rodyn_kinds, only: wp
+   use rodyn_errors, only: error_type
+   use rodyn_scene, only: scene_type
+   use rodyn_frequencies, only: natural_frequencies
+   use rodyn_text, only: to_text
+   implicit none (type, external)
+   private
+   public :: notes_on, neglected_damping
+
+   integer, parameter :: most_dof = 600                   !! beyond, eigenvalues would cost more than they tell
+   real(wp), parameter :: least_neglected = 1.0e-9_wp     !! smaller terms are not worth a word
+   character(len=*), parameter :: remedy = "; dampers = 'exact' keeps them"
+
+contains
+
+   !> One line for each note, without a closing newline; empty if there is nothing to say.
+   function notes_on(scene, q, ledger) result(text)
+      type(scene_type), intent(in) :: scene
+      real(wp), intent(in) :: q(:)    !! coordinates at the start (dof)
+      logical, intent(in) :: ledger   !! energies are recorded
+      character(len=:), allocatable :: text
+      character(len=8) :: digits
+      real(wp) :: term, frequency
+      integer :: hinge
+
+      text = ''
+      if (ledger .and. scene%dynamic_bending .and. .not. scene%consistent) &
+         text = "formulation 'paper' has no exact energy: the energy residual includes the formulation's own"
+      call neglected_damping(scene, q, term, hinge, frequency)
+      if (.not. term > least_neglected) return
+      if (len(text) > 0) text = text//new_line('a')
+      if (term > huge(term)) then
+         text = text//'quasistatic bending neglects terms (D w/C)^2 of the dampers: without bound at hinge '// &
+                to_text(hinge)//', which has a damper but no spring'//remedy
+         return
+      end if
+      write (digits, '(es8.1)') term
+      text = text//'quasistatic bending neglects terms (D w/C)^2 of the dampers: up to '//trim(adjustl(digits))// &
+             ' (hinge '//to_text(hinge)
+      write (digits, '(es8.2)') frequency
+      text = text//', w = '//trim(adjustl(digits))//' rad/s)'//remedy
+   end function notes_on
+
+   !> Largest (D w/C)^2 of the hinges, w the highest natural frequency, MODEL sec. 5: the relative size of what
+   !> quasistatic bending with reduced dampers leaves out. Zero where nothing is left out or nobody looks.
+   subroutine neglected_damping(scene, q, term, hinge, frequency)
+      type(scene_type), intent(in) :: scene
+      real(wp), intent(in) :: q(:)       !! coordinates (dof)
+      real(wp), intent(out) :: term      !! infinite for a damper without a spring
+      integer, intent(out) :: hinge      !! where it is largest, 0..n-1
+      real(wp), intent(out) :: frequency !! w [rad/s]
+      real(wp), allocatable :: frequencies(:)
+      type(error_type), allocatable :: error
+      integer :: k
+
+      term = 0.0_wp
+      hinge = 0
+      frequency = 0.0_wp
+      if (.not. (scene%quasistatic .and. scene%hinges%has_damping) .or. scene%n_dof > most_dof) return
+      if (size(scene%hinges%relaxing) > 0) return
+      call natural_frequencies(scene, q, frequencies, error)
+      if (allocated(error)) return
+      frequency = maxval(frequencies)
+      associate (c => scene%hinges%stiffness, d => scene%hinges%damping)
+         do k = 0, scene%n - 1
+            if (.not. size_of(d(k), c(k)) > term) cycle
+            term = size_of(d(k), c(k))
+            hinge = k
+         end do
+      end associate
+
+   contains
+
+      !> (D w/C)^2, without an overflow on the way.
+      pure real(wp) function size_of(damping, stiffness)
+         use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_positive_inf
+         real(wp), intent(in) :: damping, stiffness
+         size_of = 0.0_wp
+         if (.not. damping > 0.0_wp) return
+         size_of = ieee_value(1.0_wp, ieee_positive_inf)
+         if (damping*frequency < 1.0e100_wp*stiffness) size_of = (damping*frequency/stiffness)**2
+      end function size_of
+
+   end subroutine neglected_damping
+
+end module rodyn_notes

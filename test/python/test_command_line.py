@@ -1,0 +1,581 @@
+"""What the program does with its arguments: commands, messages, exit codes, files.
+
+RODYN=path  the program under test; otherwise bin/rodyn.
+"""
+
+import os
+import pathlib
+import re
+import subprocess
+
+import h5py
+import numpy as np
+import pytest
+import xarray
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+RODYN = os.environ.get("RODYN", str(ROOT / "bin" / "rodyn"))
+
+SPACECRAFT = "&spacecraft mass = 122.5, inertia = 10, hinge_x = 0.35, hinge_y = 0.35 /\n"
+FIXED = "&spacecraft motion = 'fixed', hinge_x = 0.35 /\n"
+CHAIN = """&chain n_rods = 3, length = 1.5, 1.4, 1.3, mass_per_length = 1.7, bending_stiffness = 1.37e4,
+   node_mass = 0.5, hinge_stiffness = 6000, 2*4000 /
+"""
+DAMPED = CHAIN.replace(" /\n", ", hinge_damping = 0.02 /\n")
+KINKED = CHAIN.replace(" /\n", ", kink = 0, 0.05, 0 /\n")
+ONE_ROD = "&chain n_rods = 1, length = 1.5, mass_per_length = 1.7, bending_stiffness = 1.37e4, hinge_stiffness = 6000 /\n"
+TIMES = "&case title = 'A test', t_end = 0.05, n_outputs = 5 /\n"
+MOMENT = "&load component = 'M', value = 1500, t_end = 0.02 /\n"
+FORCE = "&load target = 'node', node = 2, component = 'Y', law = 'sine_squared', value = 50, rate = 40 /\n"
+LUMPED = "&model inertia = 'lumped', bending = 'rigid' /\n"
+QUASISTATIC = "&model inertia = 'lumped', bending = 'quasistatic' /\n"
+PAPER = "&model formulation = 'paper' /\n"
+NO_LEDGER = "&output ledger = .false. /\n"
+
+#: One scene of every kind.
+SCENES = {
+    "flexible": TIMES + SPACECRAFT + DAMPED + MOMENT + FORCE,
+    "one rod": TIMES + SPACECRAFT + ONE_ROD + MOMENT,
+    "one rigid rod, fixed": TIMES + FIXED + ONE_ROD + "&model bending = 'rigid' /\n&initial phi_rate = 1 /\n",
+    "rigid": TIMES + SPACECRAFT + KINKED + "&model bending = 'rigid' /\n" + MOMENT,
+    "lumped": TIMES + SPACECRAFT + CHAIN + LUMPED + MOMENT,
+    "quasistatic": TIMES + SPACECRAFT + DAMPED + QUASISTATIC + MOMENT,
+    "quasistatic, exact, bdf": TIMES + SPACECRAFT + DAMPED + QUASISTATIC.replace(" /", ", dampers = 'exact' /") + MOMENT
+    + "&solver rtol = 1e-5, atol = 1e-7 /\n",
+    "fixed": TIMES + FIXED + KINKED + FORCE,
+    "paper, bdf, assembled": TIMES + SPACECRAFT + CHAIN + MOMENT + "&solver method = 'bdf', rtol = 1e-6, atol = 1e-8 /\n"
+    + "&model formulation = 'paper', kernel = 'assembled' /\n",
+    "adams": TIMES + SPACECRAFT + CHAIN + MOMENT + "&solver method = 'adams', order = 8, max_step = 1e-3 /\n",
+    "erk, fixed step": TIMES + SPACECRAFT + CHAIN + MOMENT + "&solver method = 'erk', order = 6, fixed_step = 2e-4 /\n",
+    "no ledger": TIMES + SPACECRAFT + CHAIN + MOMENT + NO_LEDGER,
+    "no loads, uncompressed": TIMES + SPACECRAFT + CHAIN + "&output compression = 0 /\n&initial phi = 0.1, 0.2, 0.3 /\n",
+}
+
+ROD_STATES = {"phi": "rad", "alpha": "rad", "beta": "rad", "phi_rate": "rad s-1", "alpha_rate": "rad s-1",
+              "beta_rate": "rad s-1"}
+SCALAR_STATES = {"velocity_x": "m s-1", "velocity_y": "m s-1", "omega": "rad s-1", "displacement_x": "m",
+                 "displacement_y": "m", "rotation": "rad"}
+LEDGER = {"energy_kinetic": "J", "energy_elastic": "J", "energy_dissipated": "J", "work_external": "J",
+          "energy_residual": "J", "momentum_x": "kg m s-1", "momentum_y": "kg m s-1", "angular_momentum": "kg m2 s-1"}
+ROOT_TEXTS = ["title", "status", "program_version", "git_commit", "compiler", "compiler_options", "sundials_version",
+              "hdf5_version", "hostname", "created", "input", "resolved_input", "notes"]
+SOLVER_NUMBERS = ["rtol", "atol", "n_steps", "n_rhs", "n_jac", "wall_seconds", "max_step", "fixed_step", "last_step",
+                  "n_error_test_failures", "n_nonlinear_failures", "n_restarts", "order"]
+
+
+def rodyn(*arguments, cwd=None, **options) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([RODYN, *map(str, arguments)], cwd=cwd, capture_output=True, text=True, timeout=120, **options)
+
+
+def write_case(directory: pathlib.Path, text: str, name: str = "case.nml") -> pathlib.Path:
+    path = directory / name
+    path.write_text(text)
+    return path
+
+
+def run_scene(directory: pathlib.Path, text: str, name: str = "case") -> pathlib.Path:
+    case = write_case(directory, text, f"{name}.nml")
+    result = rodyn("run", case, cwd=directory)
+    assert result.returncode == 0, result.stderr
+    return directory / f"{name}.h5"
+
+
+def files(directory: pathlib.Path) -> list[str]:
+    return sorted(path.name for path in directory.iterdir())
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """Run files of all scenes, and what was printed."""
+    directory = tmp_path_factory.mktemp("scenes")
+    found = {}
+    for number, (name, text) in enumerate(SCENES.items()):
+        case = write_case(directory, text, f"{number}.nml")
+        result = rodyn("run", case, "--output", directory / f"{number}.h5")
+        assert result.returncode == 0, (name, result.stderr)
+        assert result.stderr == "", name
+        found[name] = directory / f"{number}.h5", result.stdout
+    return found
+
+
+# Commands and usage
+
+
+def test_version_names_the_program_and_its_commit():
+    result = rodyn("--version")
+    assert result.returncode == 0 and result.stderr == ""
+    assert re.fullmatch(r"rodyn \d+\.\d+\.\d+ \(\S+\)\n", result.stdout)
+
+
+def test_help_is_printed_by_the_program_and_by_every_command(tmp_path):
+    result = rodyn("--help")
+    assert result.returncode == 0 and result.stderr == ""
+    commands = re.findall(r"^  rodyn (\w+)", result.stdout, re.MULTILINE)
+    assert {"run", "check", "defaults"} <= set(commands)
+    for command in commands:
+        for option in ("--help", "-h"):
+            result = rodyn(command, option, cwd=tmp_path)
+            assert result.returncode == 0 and result.stderr == "", command
+            assert result.stdout.startswith(f"rodyn {command}"), command
+    assert files(tmp_path) == []
+
+
+@pytest.mark.parametrize("arguments, message", [
+    ([], "rodyn run CASE.nml"),
+    (["integrate"], "there is no command 'integrate'"),
+    (["Run"], "there is no command 'Run'"),
+    (["--quiet"], "there is no command '--quiet'"),
+    (["run"], "which file?"),
+    (["check"], "which file?"),
+    (["run", "--force"], "which file?"),
+    (["run", "case.nml", "--overwrite"], "there is no option '--overwrite'"),
+    (["run", "case.nml", "-x"], "there is no option '-x'"),
+    (["check", "case.nml", "--force"], "there is no option '--force'"),
+    (["check", "case.nml", "--output", "x.h5"], "there is no option '--output'"),
+    (["run", "case.nml", "other.nml"], "one file at a time; 'other.nml'"),
+    (["check", "case.nml", "other.nml"], "one file at a time; 'other.nml'"),
+    (["run", "case.nml", "--output"], "--output needs a file name"),
+    (["run", "case.nml", "--output="], "the name of the output file is empty"),
+    (["run", "case.nml", "--output", ""], "the name of the output file is empty"),
+    (["defaults", "walk"], "'walk' is not one of"),
+    (["defaults", "run", "walk"], "'walk' is too much"),
+    (["run", "missing.nml"], "missing.nml: cannot be read (No such file or directory)"),
+    (["check", "missing.nml"], "missing.nml: cannot be read (No such file or directory)"),
+    (["run", "directory"], "directory: cannot be read (Is a directory)"),
+    (["check", "directory"], "directory: cannot be read (Is a directory)"),
+    (["run", ""], "the path of the input file is empty"),
+    (["run", "case.nml", "--output", "directory"], "directory: is a directory"),
+    (["run", "case.nml", "--output", "nowhere/x.h5"], "the directory 'nowhere' does not exist"),
+    (["run", "case.nml", "--output", "case.nml/x.h5"], "'case.nml' is not a directory"),
+])
+def test_wrong_usage_is_told_and_leaves_nothing(tmp_path, arguments, message):
+    write_case(tmp_path, SCENES["one rod"])
+    (tmp_path / "directory").mkdir()
+    result = rodyn(*arguments, cwd=tmp_path)
+    assert result.returncode == 2
+    assert message in result.stderr
+    assert result.stdout == ""
+    assert files(tmp_path) == ["case.nml", "directory"] and files(tmp_path / "directory") == []
+
+
+def test_defaults_are_a_case_that_is_valid_and_runs(tmp_path):
+    defaults = rodyn("defaults")
+    assert defaults.returncode == 0 and defaults.stderr == ""
+    assert defaults.stdout == rodyn("defaults", "run").stdout
+    case = write_case(tmp_path, defaults.stdout, "x.nml")
+    check = rodyn("check", case)
+    assert (check.returncode, check.stdout, check.stderr) == (0, f"{case}: valid\n", "")
+    result = rodyn("run", "x.nml", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert files(tmp_path) == ["x.h5", "x.nml"]
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no device that is always full")
+@pytest.mark.parametrize("arguments", [["defaults"], ["--version"], ["--help"], ["run", "--help"]])
+def test_output_that_cannot_be_written_is_a_failure(arguments):
+    with open("/dev/full", "w") as full:
+        result = subprocess.run([RODYN, *arguments], stdout=full, stderr=subprocess.PIPE, text=True)
+    assert result.returncode == 1
+    assert result.stderr == "rodyn: standard output cannot be written: No space left on device\n"
+
+
+# Faults of a case
+
+
+BAD_CASE = """&case t_end = -1, n_outputs = 1.5 /
+&spacecraft mass = 122,5, inertia = 10 /
+&chain n_rods = 3, length = 1.5, 1.5, -1.5, mass_per_length = NaN, bending_stiffness = 1e4, 1e4,
+   hinge_stifness = 6000, hinge_stiffness = 4000 /
+&model bending = 'elastic' /
+&solver rtol = 0 /
+&load target = 'node', node = 4, component = 'X', value = 1 /
+&forces /
+"""
+
+
+@pytest.mark.parametrize("command", ["run", "check"])
+def test_all_faults_of_a_case_come_at_once(tmp_path, command):
+    write_case(tmp_path, BAD_CASE, "bad.nml")
+    result = rodyn(command, "bad.nml", cwd=tmp_path)
+    assert result.returncode == 2
+    assert result.stdout == ""
+    assert files(tmp_path) == ["bad.nml"]
+    lines = result.stderr.splitlines()
+    for line in lines:
+        assert re.match(r"bad\.nml:\d+: &\w+", line), line
+    faults = {tuple(re.match(r"bad\.nml:(\d+): &(\w+) ?(\w*)", line).groups()) for line in lines}
+    assert {("1", "case", "t_end"), ("1", "case", "n_outputs"), ("3", "chain", "length"), ("3", "chain", "mass_per_length"),
+            ("3", "chain", "bending_stiffness"), ("4", "chain", "hinge_stifness"), ("5", "model", "bending"),
+            ("6", "solver", "rtol"), ("7", "load", "node"), ("8", "forces", "")} <= faults
+    assert any(fault[:2] == ("2", "spacecraft") for fault in faults)
+    assert "bad.nml:3: &chain length(3) = -1.5: must be positive [m]" in lines
+    assert "hinge_stiffness" in next(line for line in lines if "hinge_stifness" in line)  # the nearest name
+    numbers = [int(line.split(":")[1]) for line in lines]
+    assert numbers == sorted(numbers)
+
+
+@pytest.mark.parametrize("text, fault", [
+    (TIMES + SPACECRAFT + CHAIN.replace("mass_per_length = 1.7", "mass_per_length = 1.7, 0, 1.7"),
+     "&chain mass_per_length = 1.7, 0, 1.7: must be positive when bending = 'dynamic', but is 0 for rod 2"),
+    (TIMES + SPACECRAFT + CHAIN.replace("mass_per_length = 1.7", "mass_per_length = 1.7, 0, 0").replace("0.5", "2*1, 0")
+     + LUMPED, "&chain node_mass = 2*1, 0: rod 3 and its outer node are both without mass"),
+    (TIMES + SPACECRAFT + CHAIN + "&model gauss_points = 1 /", "&model gauss_points = 1: must be at least 2"),
+    (TIMES + SPACECRAFT + CHAIN + "&solver order = 5 /", "&solver order = 5: goes with a method that is named"),
+    (TIMES + SPACECRAFT + CHAIN + "&solver method = 'bdf', order = 6 /", "&solver order = 6: must lie in 0..5"),
+    (TIMES + SPACECRAFT + CHAIN + "&solver method = 'erk', order = 9 /", "&solver order = 9: must be 0 or lie in 2..8"),
+    (TIMES + SPACECRAFT + CHAIN + "&solver method = 'dop853', order = 5 /", "&solver order = 5: must be 0 or 8"),
+    ("&case n_outputs = 2147483647 /\n" + SPACECRAFT + CHAIN, "&case n_outputs = 2147483647: must lie in 1..100000000"),
+])
+def test_what_a_run_would_refuse_is_found_by_check(tmp_path, text, fault):
+    case = write_case(tmp_path, text)
+    for command in ("check", "run"):
+        result = rodyn(command, case.name, cwd=tmp_path)
+        assert result.returncode == 2
+        assert len(result.stderr.splitlines()) == 1
+        assert re.match(r"case\.nml:\d+: ", result.stderr) and fault in result.stderr
+    assert files(tmp_path) == ["case.nml"]
+
+
+@pytest.mark.parametrize("text", [
+    TIMES + SPACECRAFT + CHAIN.replace("mass_per_length = 1.7", "mass_per_length = 0") + LUMPED,
+    TIMES + SPACECRAFT + CHAIN.replace("mass_per_length = 1.7", "mass_per_length = 0, 0, 1").replace("0.5", "1, 0, 0") + LUMPED,
+    TIMES + SPACECRAFT + CHAIN.replace("node_mass = 0.5", "node_mass = 0") + "&model bending = 'rigid' /\n",
+])
+def test_masses_that_suffice_are_accepted(tmp_path, text):
+    run_scene(tmp_path, text)
+
+
+# Names of results
+
+
+def test_the_result_is_named_after_the_case_and_stands_in_the_working_directory(tmp_path):
+    (tmp_path / "cases.d").mkdir()
+    (tmp_path / "work").mkdir()
+    for name, expected in [("a.nml", "a.h5"), ("b.c.nml", "b.c.h5"), ("plain", "plain.h5"), (".hidden", ".hidden.h5")]:
+        case = write_case(tmp_path / "cases.d", SCENES["one rod"], name)
+        result = rodyn("run", case, cwd=tmp_path / "work")
+        assert result.returncode == 0, result.stderr
+        assert result.stdout.splitlines()[-1] == f"file    {expected}"
+        assert expected in files(tmp_path / "work")
+    assert len(files(tmp_path / "work")) == 4 and len(files(tmp_path / "cases.d")) == 4
+
+
+@pytest.mark.parametrize("option", [["--output", "x y.h5"], ["--output=x y.h5"], ["-o", "x y.h5"]])
+def test_output_names_the_result(tmp_path, option):
+    write_case(tmp_path, SCENES["one rod"])
+    for arguments in (["run", "case.nml", *option], ["run", *option, "case.nml", "--force"]):
+        assert rodyn(*arguments, cwd=tmp_path).returncode == 0
+        assert files(tmp_path) == ["case.nml", "x y.h5"]
+
+
+def test_the_case_may_name_its_result_and_the_option_wins(tmp_path):
+    write_case(tmp_path, SCENES["one rod"] + "&output file = 'mine.h5' /\n")
+    assert rodyn("run", "case.nml", cwd=tmp_path).returncode == 0
+    assert files(tmp_path) == ["case.nml", "mine.h5"]
+    assert rodyn("run", "case.nml", "--output", "other.h5", cwd=tmp_path).returncode == 0
+    assert files(tmp_path) == ["case.nml", "mine.h5", "other.h5"]
+
+
+def test_an_existing_result_is_replaced_by_force_only(tmp_path):
+    write_case(tmp_path, SCENES["one rod"])
+    (tmp_path / "case.h5").write_text("precious")
+    result = rodyn("run", "case.nml", cwd=tmp_path)
+    assert (result.returncode, result.stdout) == (2, "")
+    assert result.stderr == "case.h5: exists already; --force replaces it\n"
+    assert (tmp_path / "case.h5").read_text() == "precious"
+    assert rodyn("run", "case.nml", "--force", cwd=tmp_path).returncode == 0
+    assert h5py.is_hdf5(tmp_path / "case.h5")
+    assert files(tmp_path) == ["case.h5", "case.nml"]
+
+
+def test_a_result_never_replaces_its_case(tmp_path):
+    case = write_case(tmp_path, SCENES["one rod"], "case.h5")
+    (tmp_path / "link").symlink_to("case.h5")
+    for arguments in (["case.h5"], ["case.h5", "--output", "./case.h5"], ["link", "--output", "case.h5"]):
+        result = rodyn("run", *arguments, "--force", cwd=tmp_path)
+        assert result.returncode == 2
+        assert "is the case itself" in result.stderr
+        assert case.read_text() == SCENES["one rod"]
+
+
+# What is printed
+
+
+def test_quiet_prints_nothing_but_errors(tmp_path):
+    write_case(tmp_path, SCENES["quasistatic"])
+    for command in ("run", "check"):
+        result = rodyn(command, "case.nml", "--quiet", cwd=tmp_path)
+        assert (result.returncode, result.stdout, result.stderr) == (0, "", "")
+    assert files(tmp_path) == ["case.h5", "case.nml"]
+    result = rodyn("run", "case.nml", "--quiet", cwd=tmp_path)
+    assert (result.returncode, result.stdout) == (2, "") and "exists already" in result.stderr
+
+
+def printed(text: str) -> dict[str, str]:
+    """Lines by their first word."""
+    return {line[:8].strip(): line[8:] for line in text.splitlines()}
+
+
+@pytest.mark.parametrize("scene, uses, skips", [
+    ("flexible", "free spacecraft, bending as motion, rod inertia, second-order inertia, dampers, 2 loads, loads on nodes, ledger",
+     "kinks"),
+    ("one rod", "free spacecraft, bending as motion, rod inertia, second-order inertia, 1 load, ledger",
+     "dampers, kinks, loads on nodes, loads after t = 0.02 s"),
+    ("lumped", "free spacecraft, 1 load, ledger",
+     "bending as motion, rod inertia, second-order inertia, dampers, kinks, loads on nodes, loads after t = 0.02 s"),
+    ("quasistatic", "free spacecraft, bending without inertia, dampers, 1 load, ledger",
+     "bending as motion, rod inertia, second-order inertia, kinks, loads on nodes, loads after t = 0.02 s"),
+    ("fixed", "bending as motion, rod inertia, second-order inertia, kinks, 1 load, loads on nodes, ledger",
+     "free spacecraft, dampers"),
+    ("no ledger", "free spacecraft, bending as motion, rod inertia, second-order inertia, 1 load",
+     "dampers, kinks, loads on nodes, loads after t = 0.02 s, ledger"),
+    ("no loads, uncompressed", "free spacecraft, bending as motion, rod inertia, second-order inertia, ledger",
+     "dampers, kinks, loads"),
+])
+def test_a_run_says_what_it_uses_and_what_it_skips(results, scene, uses, skips):
+    lines = printed(results[scene][1])
+    assert lines["uses"] == uses
+    assert lines["skips"] == skips
+    assert lines["done"].startswith("t = 0.05 s, ")
+    assert ("ledger" in lines) == (scene != "no ledger")
+
+
+@pytest.mark.parametrize("scene, sizes, method", [
+    ("flexible", "3 rods (3 distinct kinds), 24 states; recursive kernel, O(n)", r"dop853: auto: frequencies .* rad/s, dampers"),
+    ("one rod", "1 rod (1 distinct kind), 12 states; recursive kernel, O(n)", r"dop853: auto: frequencies .* at least \d+ steps"),
+    ("one rigid rod, fixed", "1 rod (1 distinct kind), 2 states; recursive kernel, O(n)", r"dop853: auto: "),
+    ("paper, bdf, assembled", "3 rods (3 distinct kinds), 24 states; assembled kernel, O(n^3)", "bdf: chosen by the case"),
+    ("adams", "3 rods (3 distinct kinds), 24 states; recursive kernel, O(n)", "adams: chosen by the case"),
+])
+def test_a_run_says_how_large_it_is_and_which_method_it_takes(results, scene, sizes, method):
+    lines = printed(results[scene][1])
+    assert lines["scene"] == sizes
+    assert re.match(method, lines["method"])
+
+
+def test_strong_dampers_call_for_an_implicit_method(tmp_path):
+    case = write_case(tmp_path, TIMES + SPACECRAFT + CHAIN.replace(" /\n", ", hinge_damping = 5e4 /\n") + MOMENT)
+    lines = printed(rodyn("run", case, cwd=tmp_path).stdout)
+    assert re.match(r"bdf: auto: .*: stiff dampers, implicit", lines["method"])
+
+
+def test_the_formulation_of_the_article_is_noted_where_it_matters(results, tmp_path):
+    words = "formulation 'paper' has no exact energy"
+    path, text = results["paper, bdf, assembled"]
+    assert printed(text)["note"].startswith(words)
+    with xarray.open_dataset(path) as run:
+        assert run.attrs["notes"].startswith(words)
+    for scene in ("flexible", "lumped", "no ledger"):
+        path, text = results[scene]
+        assert "note" not in printed(text)
+        with xarray.open_dataset(path) as run:
+            assert run.attrs["notes"] == ""
+    # Without deflections or without energies there is nothing to note.
+    for number, text in enumerate([CHAIN + "&model formulation = 'paper', bending = 'rigid' /\n", CHAIN + PAPER + NO_LEDGER]):
+        case = write_case(tmp_path, TIMES + SPACECRAFT + text, f"{number}.nml")
+        assert "note" not in printed(rodyn("run", case, cwd=tmp_path).stdout)
+
+
+def test_what_quasistatic_bending_leaves_out_is_noted(results, tmp_path):
+    # One rod on a fixed spacecraft: w^2 = k/(m l^2), 1/k = 1/C + l/(3 EI).
+    length, mass, stiffness, bending, damping = 1.5, 2.0, 6000.0, 1.37e4, 3.0
+    chain = (f"&chain n_rods = 1, length = {length}, mass_per_length = 0, node_mass = {mass}, hinge_stiffness = {stiffness}, "
+             f"bending_stiffness = {bending}, hinge_damping = %s /\n")
+    frequency = np.sqrt(1/(1/stiffness + length/(3*bending))/(mass*length**2))
+    case = write_case(tmp_path, TIMES + FIXED + chain % damping + QUASISTATIC + "&initial phi = 0.1 /\n")
+    note = printed(rodyn("run", case, cwd=tmp_path).stdout)["note"]
+    value, hinge, w = re.fullmatch(r"quasistatic bending neglects terms \(D w/C\)\^2 of the dampers: "
+                                   r"up to (\S+) \(hinge (\d+), w = (\S+) rad/s\); dampers = 'exact' keeps them", note).groups()
+    assert float(value) == pytest.approx((damping*frequency/stiffness)**2, rel=0.05)
+    assert float(w) == pytest.approx(frequency, rel=0.005)
+    assert hinge == "0"
+    with h5py.File(tmp_path / "case.h5") as file:
+        assert file.attrs["notes"].decode() == note
+        assert file.attrs.get_id("notes").get_type().is_variable_str() is False
+    assert "note" in printed(results["quasistatic"][1])
+    case = write_case(tmp_path, TIMES + FIXED + chain % 1e-3 + QUASISTATIC, "weak.nml")  # below 1e-9
+    assert "note" not in printed(rodyn("run", case, cwd=tmp_path).stdout)
+    exact = QUASISTATIC.replace(" /", ", dampers = 'exact' /")
+    case = write_case(tmp_path, TIMES + FIXED + chain % damping + exact, "exact.nml")
+    assert "note" not in printed(rodyn("run", case, cwd=tmp_path).stdout)
+    loose = CHAIN.replace("2*4000 /", "0, 4000, hinge_damping = 0, 1, 1 /")
+    case = write_case(tmp_path, TIMES + SPACECRAFT + loose + QUASISTATIC, "loose.nml")
+    result = rodyn("run", case, cwd=tmp_path)
+    assert result.returncode == 0
+    assert "without bound at hinge 1, which has a damper but no spring" in printed(result.stdout)["note"]
+
+
+# Runs that fail
+
+
+def rows_until_failure(path: pathlib.Path, n_intervals: int, t_end: float) -> xarray.Dataset:
+    """The readable file of a failed run: all rows that were reached, all finite."""
+    with xarray.open_dataset(path) as run:
+        run.load()
+    assert run.attrs["status"] == "failed"
+    assert run.attrs["message"]
+    assert 1 <= run.sizes["time"] <= n_intervals
+    np.testing.assert_allclose(run.time, np.arange(run.sizes["time"])*t_end/n_intervals, rtol=1e-14)
+    assert run.attrs["t_reached"] == run.time[-1]
+    for name in run.data_vars:
+        assert np.all(np.isfinite(run[name])), name
+    return run
+
+
+@pytest.mark.parametrize("method", ["adams", "bdf", "erk", "dop853"])
+def test_too_many_steps_end_a_run(tmp_path, method):
+    text = "&case t_end = 0.05, n_outputs = 50 /\n" + SPACECRAFT + CHAIN + MOMENT
+    whole = run_scene(tmp_path, text + f"&solver method = '{method}' /\n", "whole")
+    write_case(tmp_path, text + f"&solver method = '{method}', max_steps = 60 /\n")
+    result = rodyn("run", "case.nml", cwd=tmp_path)
+    assert result.returncode == 1
+    match = re.fullmatch(r"max_steps = 60 reached at t = (\S+) s \(rows until then are in case\.h5\)\n", result.stderr)
+    assert match, result.stderr
+    lines = printed(result.stdout)
+    assert "done" not in lines and lines["failed"].startswith(f"t = {match[1]} s, 60 steps")
+    run = rows_until_failure(tmp_path / "case.h5", 50, 0.05)
+    t_last = float(match[1])
+    assert run.attrs["t_reached"] <= t_last < run.attrs["t_reached"] + 0.001 + 1e-12
+    assert f"max_steps = 60 reached at t = {match[1]} s" in run.attrs["message"]
+    assert files(tmp_path) == ["case.h5", "case.nml", "whole.h5", "whole.nml"]
+    with h5py.File(tmp_path / "case.h5") as failed, h5py.File(whole) as good:
+        assert failed["solver"].attrs["n_steps"] == 60
+        n = failed["time"].size
+        for name in (*ROD_STATES, *SCALAR_STATES):
+            assert failed[name][:].tobytes() == good[name][:n].tobytes(), name
+
+
+def soft_case(method: str, kernel: str) -> str:
+    """Absurdly soft rods: in `paper` the mass matrix loses definiteness as they bend."""
+    return ("&case t_end = 0.1, n_outputs = 100 /\n" + SPACECRAFT + CHAIN.replace("1.37e4", "1")
+            + "&load component = 'M', value = 1.5e5 /\n"
+            + f"&model formulation = 'paper', kernel = '{kernel}' /\n&solver method = '{method}' /\n")
+
+
+@pytest.mark.parametrize("method", ["auto", "adams", "bdf", "erk", "dop853"])
+def test_a_mass_matrix_that_loses_definiteness_ends_a_run(tmp_path, method):
+    reached = []
+    for kernel in ("recursive", "assembled"):
+        case = write_case(tmp_path, soft_case(method, kernel), f"{kernel}.nml")
+        result = rodyn("run", case.name, cwd=tmp_path)
+        assert result.returncode == 1
+        assert len(result.stderr.splitlines()) == 1, result.stderr  # no backtrace, nothing from the libraries
+        match = re.match(r"(CVode|ERKStepEvolve|dop853) at t = (\S+) s: ", result.stderr)
+        assert match, result.stderr
+        assert f"(rows until then are in {kernel}.h5)" in result.stderr
+        run = rows_until_failure(tmp_path / f"{kernel}.h5", 100, 0.1)
+        assert run.sizes["time"] > 10
+        assert run.attrs["t_reached"] <= float(match[2]) < run.attrs["t_reached"] + 0.001
+        reached.append(float(match[2]))
+    assert reached[0] == pytest.approx(reached[1], abs=1e-6)  # both kernels notice it, at the same time
+    assert files(tmp_path) == ["assembled.h5", "assembled.nml", "recursive.h5", "recursive.nml"]
+
+
+@pytest.mark.parametrize("method", ["auto", "adams", "bdf", "erk", "dop853"])
+def test_a_start_without_a_definite_mass_matrix_fails_with_its_first_row(tmp_path, method):
+    text = TIMES + SPACECRAFT + CHAIN + PAPER + f"&initial alpha = 3*20, beta = 3*-20 /\n&solver method = '{method}' /\n"
+    write_case(tmp_path, text)
+    result = rodyn("run", "case.nml", cwd=tmp_path)
+    assert result.returncode == 1
+    assert len(result.stderr.splitlines()) == 1 and "at t = 0 s" in result.stderr, result.stderr
+    assert rows_until_failure(tmp_path / "case.h5", 5, 0.05).sizes["time"] == 1
+
+
+@pytest.mark.parametrize("method", ["auto", "adams", "bdf", "erk", "dop853"])
+def test_a_state_that_becomes_infinite_ends_a_run(tmp_path, method):
+    text = ("&case t_end = 1, n_outputs = 100 /\n" + SPACECRAFT + CHAIN
+            + "&load component = 'X', law = 'table', times = 0, 0.105, 0.11, 1, values = 0, 0, 1e308, 1e308 /\n"
+            + "&load component = 'Y', law = 'table', times = 0, 0.105, 0.11, 1, values = 0, 0, 1e308, 1e308 /\n"
+            + f"&solver method = '{method}', max_steps = 100000 /\n")
+    write_case(tmp_path, text)
+    result = rodyn("run", "case.nml", cwd=tmp_path)
+    assert result.returncode == 1
+    assert len(result.stderr.splitlines()) == 1 and " at t = 0.1" in result.stderr, result.stderr
+    run = rows_until_failure(tmp_path / "case.h5", 100, 1.0)
+    assert run.sizes["time"] >= 11
+
+
+# Run files of every kind of scene
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_every_scene_gives_all_states_with_units(results, scene):
+    with xarray.open_dataset(results[scene][0]) as run:
+        n = 1 if scene.startswith("one") else 3
+        assert dict(run.sizes) == {"time": 6, "rod": n, "hinge": n, "node": n + 1}
+        assert run.rod.values.tolist() == list(range(1, n + 1))
+        assert run.hinge.values.tolist() == list(range(n))
+        assert run.node.values.tolist() == list(range(n + 1))
+        np.testing.assert_allclose(run.time, np.linspace(0, 0.05, 6), rtol=1e-15)
+        assert run.time.units == "s"
+        expected = {k: (("time", "rod"), u) for k, u in ROD_STATES.items()}
+        expected |= {k: (("time",), u) for k, u in SCALAR_STATES.items()}
+        if scene != "no ledger":
+            expected |= {k: (("time",), u) for k, u in LEDGER.items()}
+        assert set(run.data_vars) == set(expected)
+        for name, (dims, units) in expected.items():
+            assert (run[name].dims, run[name].units) == (dims, units), name
+            assert run[name].long_name and run[name].dtype == np.float64, name
+            assert np.all(np.isfinite(run[name])), name
+        slaved = {"quasistatic", "quasistatic, exact, bdf"}
+        rigid = {"one rigid rod, fixed", "rigid", "lumped"}
+        for name in ("alpha", "beta", "alpha_rate", "beta_rate"):
+            assert bool(np.any(run[name])) == (scene not in rigid), name
+        if scene in slaved:  # EI/l (4 alpha + 2 beta) = -T_0, and no moment at the tip
+            np.testing.assert_allclose(run.alpha[:, -1], -2*run.beta[:, -1], rtol=1e-10)
+        for name in SCALAR_STATES:
+            if "fixed" in scene and "step" not in scene:
+                assert not np.any(run[name]), name
+        assert np.any(run.phi[-1])
+        if scene != "no ledger" and "paper" not in scene:
+            scale = float((run.energy_kinetic + run.energy_elastic).max())
+            assert float(abs(run.energy_residual).max()) < 1e-5*scale
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_every_run_file_says_how_it_came_about(results, scene):
+    path, _ = results[scene]
+    with h5py.File(path) as file:
+        for name in ROOT_TEXTS:
+            attribute = file.attrs.get_id(name)
+            assert attribute.shape == () and not attribute.get_type().is_variable_str(), name
+        assert file.attrs["title"].decode() == "A test"
+        assert file.attrs["status"].decode() == "done"
+        assert "message" not in file.attrs
+        assert file.attrs["input"].decode() == SCENES[scene]
+        assert file.attrs["t_reached"] == file["time"][-1] == 0.05
+        solver = file["solver"].attrs
+        for name in SOLVER_NUMBERS:
+            assert np.isscalar(solver[name]) and np.isfinite(solver[name]), name
+        method = next((m for m in ("bdf", "adams", "erk") if m in scene), "dop853")
+        assert solver["method"].decode() == method
+        assert solver["kernel"].decode() == ("assembled" if "assembled" in scene else "recursive")
+        assert solver["reason"]
+        assert solver["n_rhs"] >= solver["n_steps"] > 0
+        assert (solver["n_jac"] > 0) == (method == "bdf")
+        switches = 1 if MOMENT in SCENES[scene] else 0
+        assert solver["n_restarts"] == switches
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_the_resolved_input_gives_the_same_run(results, scene, tmp_path):
+    path, _ = results[scene]
+    with h5py.File(path) as file:
+        text = file.attrs["resolved_input"].decode()
+    again = run_scene(tmp_path, text, "again")
+    with h5py.File(path) as first, h5py.File(again) as second:
+        assert second.attrs["resolved_input"].decode() == text
+        assert set(first) == set(second)
+        for name, item in first.items():
+            if isinstance(item, h5py.Dataset):
+                assert item[:].tobytes() == second[name][:].tobytes(), name
+
+
+def test_a_run_with_a_ledger_makes_the_same_steps_as_one_without(tmp_path):
+    for method in ("adams", "bdf", "erk", "dop853"):
+        text = SCENES["flexible"] + f"&solver method = '{method}' /\n"
+        with_ledger = run_scene(tmp_path, text, f"{method}1")
+        without = run_scene(tmp_path, text + NO_LEDGER, f"{method}2")
+        with h5py.File(with_ledger) as first, h5py.File(without) as second:
+            for name in (*ROD_STATES, *SCALAR_STATES):
+                assert first[name][:].tobytes() == second[name][:].tobytes(), (method, name)
