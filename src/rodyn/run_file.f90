@@ -78,8 +78,6 @@ module rodyn_run_file
       integer(i8) :: n_steps = 0_i8
       integer(i8) :: n_rhs = 0_i8                 !! right-hand sides
       integer(i8) :: n_jac = 0_i8                 !! Jacobians
-      integer(i8) :: n_linear_setups = 0_i8
-      integer(i8) :: n_nonlinear_iterations = 0_i8
       integer(i8) :: n_nonlinear_failures = 0_i8
       integer(i8) :: n_error_test_failures = 0_i8
       integer(i8) :: n_restarts = 0_i8            !! at switches of loads
@@ -366,8 +364,6 @@ contains
       call put_count('n_steps', report%n_steps)
       call put_count('n_rhs', report%n_rhs)
       call put_count('n_jac', report%n_jac)
-      call put_count('n_linear_setups', report%n_linear_setups)
-      call put_count('n_nonlinear_iterations', report%n_nonlinear_iterations)
       call put_count('n_nonlinear_failures', report%n_nonlinear_failures)
       call put_count('n_error_test_failures', report%n_error_test_failures)
       call put_count('n_restarts', report%n_restarts)
