@@ -1,0 +1,90 @@
+"""Where the spacecraft, the nodes and the points of the rods are, MODEL of the article: nodes joined by chords, cubic rods on them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from rodyn_data import Run
+
+POINTS = 21  # of the curve of a rod
+
+
+class Shape(NamedTuple):
+    """One configuration, in the frame that was asked for."""
+
+    time: float
+    centre: np.ndarray  # (2) centre of mass of the spacecraft [m]
+    body: np.ndarray  # (corner, 2) outline of the spacecraft, closed; empty on a fixed one
+    nodes: np.ndarray  # (n + 1, 2)
+    rods: np.ndarray  # (n, POINTS, 2) curves, deflection magnified
+
+
+def shapes(run: Run, rows: np.ndarray, magnification: float = 1.0, frame: str = "moving") -> list[Shape]:
+    """Shapes at rows of the run (rising)."""
+    names = ["phi", "alpha", "beta", "displacement_x", "displacement_y", "rotation"]
+    state = {name: run.rows(name, rows) for name in names}
+    time = run.rows("time", rows)
+    hinge = np.array([run.number("spacecraft", "hinge_x", 0.0), run.number("spacecraft", "hinge_y", 0.0)])
+    length = run.per_rod("length")
+    outline = body_outline(run)
+    result = []
+    for i, t in enumerate(time):
+        nodes, rods = chain(hinge, length, state["phi"][i], state["alpha"][i], state["beta"][i], magnification)
+        shape = Shape(float(t), np.zeros(2), outline, nodes, rods)
+        if frame == "inertial":
+            displacement = np.array([state["displacement_x"][i], state["displacement_y"][i]])
+            shape = turned(shape, displacement, float(state["rotation"][i]))
+        result.append(shape)
+    return result
+
+
+def chain(hinge: np.ndarray, length: np.ndarray, phi: np.ndarray, alpha: np.ndarray, beta: np.ndarray,
+          magnification: float) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes r_k = r_{k-1} + l e_k, and points r_{k-1} + s e_k + v n_k with v = Na alpha + Nb beta."""
+    along = np.stack([np.cos(phi), np.sin(phi)], axis=-1)
+    across = np.stack([-along[:, 1], along[:, 0]], axis=-1)
+    nodes = np.concatenate([hinge[None], hinge + np.cumsum(length[:, None] * along, axis=0)])
+    x = np.linspace(0.0, 1.0, POINTS)
+    v = magnification * deflection(length, alpha, beta, x)
+    rods = nodes[:-1, None] + (length[:, None] * x)[..., None] * along[:, None] + v[..., None] * across[:, None]
+    return nodes, rods
+
+
+def deflection(length: np.ndarray, alpha: np.ndarray, beta: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """v at s = x l of each rod, (..., n, points)."""
+    na, nb = x * (1 - x) ** 2, -(x**2) * (1 - x)
+    return length[..., None] * (na * alpha[..., None] + nb * beta[..., None])
+
+
+def largest_deflection(run: Run, row: int) -> float:
+    """Of all rods, at the points of the curves [m]."""
+    v = deflection(run.per_rod("length"), run.rows("alpha", row), run.rows("beta", row), np.linspace(0, 1, 201))
+    return float(np.max(np.abs(v)))
+
+
+def body_outline(run: Run) -> np.ndarray:
+    """The uniform square body of the same mass and inertia, J = M a^2 / 6; nothing if the spacecraft is fixed."""
+    if run.group("spacecraft").get("motion") == "fixed":
+        return np.empty((0, 2))
+    mass, inertia = run.number("spacecraft", "mass"), run.number("spacecraft", "inertia")
+    if not mass or not inertia:
+        return np.empty((0, 2))
+    half = 0.5 * np.sqrt(6.0 * inertia / mass)
+    return half * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1], [1, 1]])
+
+
+def turned(shape: Shape, displacement: np.ndarray, rotation: float) -> Shape:
+    """In the inertial frame: R(theta) (u + r), since u is projected on the moving axes."""
+    c, s = np.cos(rotation), np.sin(rotation)
+    matrix = np.array([[c, s], [-s, c]])  # for rows
+    move = lambda points: (points + displacement) @ matrix  # noqa: E731
+    return Shape(shape.time, move(shape.centre), move(shape.body), move(shape.nodes), move(shape.rods))
+
+
+def limits(found: list[Shape], margin: float = 0.06) -> tuple[float, float, float, float]:
+    """x and y limits that hold all shapes."""
+    points = np.concatenate([p.reshape(-1, 2) for s in found for p in (s.centre[None], s.body, s.nodes, s.rods)])
+    low, high = points.min(axis=0), points.max(axis=0)
+    pad = margin * max(*(high - low), 1e-9)
+    return low[0] - pad, high[0] + pad, low[1] - pad, high[1] + pad

@@ -1,0 +1,90 @@
+#!/usr/bin/env python3
+"""Plot quantities of a run against time; by default the motion of the spacecraft in four panels (the article's figure 3).
+
+    postproc/histories.py example.h5
+    postproc/histories.py beam.h5 --quantity "phi(1)" "phi(40)" "phi_rate(40)"
+"""
+
+from __future__ import annotations
+
+import pathlib
+import sys
+from collections.abc import Sequence
+
+import command
+import style
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from rodyn_data import Quantity, Run, open_run
+
+SPACECRAFT = [
+    ("velocity of the spacecraft, moving axes", ["velocity_x", "velocity_y"]),
+    ("angular velocity", ["omega"]),
+    ("displacement of the spacecraft, moving axes", ["displacement_x", "displacement_y"]),
+    ("rotation", ["rotation"]),
+]
+
+
+def plot(file: str | pathlib.Path, out: str | pathlib.Path, quantities: Sequence[str] = ()) -> Figure:
+    """Four panels of the spacecraft, or the named quantities, those of one unit together."""
+    with open_run(file) as run:
+        if quantities:
+            panels = by_unit([run.quantity(name) for name in quantities])
+        else:
+            panels = [(title, [run.quantity(name) for name in names]) for title, names in SPACECRAFT]
+        figure = draw(run, panels)
+    style.save(figure, out)
+    return figure
+
+
+def by_unit(quantities: Sequence[Quantity]) -> list[tuple[str, list[Quantity]]]:
+    panels: dict[str, list[Quantity]] = {}
+    for quantity in quantities:
+        panels.setdefault(quantity.unit, []).append(quantity)
+    return [("; ".join(dict.fromkeys(q.meaning.split(" of rod")[0] for q in group)), group) for group in panels.values()]
+
+
+def draw(run: Run, panels: Sequence[tuple[str, Sequence[Quantity]]]) -> Figure:
+    columns = 2 if len(panels) > 1 else 1
+    rows = -(-len(panels) // columns)
+    figure, grid = style.new_figure(rows, columns, sharex=True)
+    time = run.time
+    figure.suptitle(style.shorten(run.title) + style.status_suffix(run.status, time[-1]))
+    for axes, (title, quantities) in zip(grid.flat, panels, strict=False):
+        draw_panel(axes, time, title, quantities)
+    for axes in grid.flat[len(panels):]:
+        axes.set_visible(False)
+    for axes in grid[-1]:
+        axes.set_xlabel("time $t$ [s]")
+        axes.tick_params(labelbottom=True)
+    return figure
+
+
+def draw_panel(axes: Axes, time, title: str, quantities: Sequence[Quantity]) -> None:
+    for i, quantity in enumerate(quantities):
+        axes.plot(*style.envelope(time, quantity.values), label=quantity.symbol, **style.line_style(i))
+    symbols = ", ".join(q.symbol for q in quantities) if len(quantities) <= 4 else quantities[0].symbol + ", …"
+    axes.set_ylabel(f"{symbols} [{quantities[0].unit}]")
+    axes.margins(x=0)
+    axes.set_title(title, loc="left")
+    if len(quantities) > 1:
+        axes.legend(loc="best", ncols=2)
+    if time.size == 1:
+        axes.plot(time, quantities[0].values, "o", color=style.COLOURS[0])
+
+
+def representative_rods(n: int) -> list[int]:
+    """At most four rods that stand for the chain."""
+    return sorted({1, max(1, n // 4), max(1, n // 2), n})
+
+
+def main() -> int:
+    parser = command.parser(__doc__)
+    parser.add_argument("-q", "--quantity", nargs="+", default=[], metavar="Q", help='such as omega, "phi(4)", energy_kinetic')
+    arguments = parser.parse_args()
+    out = command.default_out(arguments, "quantities" if arguments.quantity else "histories")
+    return command.finish(lambda: plot(arguments.file, out, arguments.quantity))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

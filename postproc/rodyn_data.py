@@ -1,0 +1,452 @@
+"""Run, sweep and benchmark files of Rodyn. Names of data sets, units and symbols stand here and nowhere else.
+
+    with open_run("example.h5") as run:
+        phi_4 = run.quantity("phi(4)")   # values, symbol, unit
+
+What a file lacks is said by a DataError, in words for its user.
+"""
+
+from __future__ import annotations
+
+import pathlib
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any, NamedTuple
+
+import h5py
+import numpy as np
+from namelist import Group, read_namelist
+
+
+class DataError(Exception):
+    """The file is not what was asked for, or lacks something."""
+
+
+class Quantity(NamedTuple):
+    """Numbers that can be put on an axis."""
+
+    name: str
+    values: np.ndarray
+    symbol: str  # for matplotlib
+    unit: str  # for matplotlib
+    meaning: str
+
+    @property
+    def label(self) -> str:
+        return f"{self.symbol} [{self.unit}]" if self.unit else self.symbol
+
+
+TIME = "time"
+ROD_SYMBOLS = {
+    "phi": r"\varphi", "alpha": r"\alpha", "beta": r"\beta",
+    "phi_rate": r"\dot{\varphi}", "alpha_rate": r"\dot{\alpha}", "beta_rate": r"\dot{\beta}",
+}
+SPACECRAFT_SYMBOLS = {
+    "velocity_x": "V_x", "velocity_y": "V_y", "omega": r"\omega",
+    "displacement_x": "u_x", "displacement_y": "u_y", "rotation": r"\theta",
+}
+LEDGER_SYMBOLS = {
+    "energy_kinetic": "T", "energy_elastic": r"\Pi", "energy_dissipated": "E_D", "work_external": "W",
+    "energy_residual": "r_E", "momentum_x": "P_X", "momentum_y": "P_Y", "angular_momentum": "L",
+}
+SYMBOLS = ROD_SYMBOLS | SPACECRAFT_SYMBOLS | LEDGER_SYMBOLS
+UNITS = (
+    dict.fromkeys(["phi", "alpha", "beta", "rotation"], "rad")
+    | dict.fromkeys(["phi_rate", "alpha_rate", "beta_rate", "omega"], "rad s-1")
+    | dict.fromkeys(["velocity_x", "velocity_y"], "m s-1")
+    | dict.fromkeys(["displacement_x", "displacement_y"], "m")
+)
+MEANINGS = {
+    "phi": "chord angle", "alpha": "slope at the inner end", "beta": "slope at the outer end",
+    "phi_rate": "rate of the chord angle", "alpha_rate": "rate of the inner slope", "beta_rate": "rate of the outer slope",
+    "velocity_x": "velocity along the moving x axis", "velocity_y": "velocity along the moving y axis",
+    "omega": "angular velocity", "displacement_x": "displacement along the moving x axis",
+    "displacement_y": "displacement along the moving y axis", "rotation": "rotation of the spacecraft",
+    "energy_kinetic": "kinetic energy", "energy_elastic": "elastic energy", "energy_dissipated": "dissipated energy",
+    "work_external": "work of loads and kinks", "energy_residual": "energy residual",
+    "momentum_x": "linear momentum, inertial X", "momentum_y": "linear momentum, inertial Y",
+    "angular_momentum": "angular momentum",
+}
+RATE_OF = {
+    "phi": "phi_rate", "alpha": "alpha_rate", "beta": "beta_rate",
+    "displacement_x": "velocity_x", "displacement_y": "velocity_y", "rotation": "omega",
+}
+# Axes of sweeps and columns of sweep files: symbol or words, unit.
+PARAMETERS = {
+    "mass_ratio": ("total node mass / total rod mass", ""),
+    "case.n_outputs": ("number of output intervals", ""), "case.t_end": ("end of the simulated time", "s"),
+    "spacecraft.mass": (r"mass of the spacecraft $M_0$", "kg"), "spacecraft.inertia": (r"inertia $J_0$", "kg m2"),
+    "spacecraft.hinge_x": (r"hinge place $x_0$", "m"), "spacecraft.hinge_y": (r"hinge place $y_0$", "m"),
+    "chain.n_rods": (r"number of rods $n$", ""), "chain.length": (r"length $l$", "m"),
+    "chain.mass_per_length": (r"mass per length $m$", "kg m-1"),
+    "chain.bending_stiffness": (r"bending stiffness $EI$", "N m2"), "chain.node_mass": (r"node mass $\mu$", "kg"),
+    "chain.hinge_stiffness": (r"hinge stiffness $C$", "N m rad-1"),
+    "chain.hinge_damping": (r"hinge damping $D$", "N m s rad-1"), "chain.kink": (r"kink $\gamma$", "rad"),
+    "model.inertia": ("inertia", ""), "model.formulation": ("formulation", ""), "model.bending": ("bending", ""),
+    "solver.rtol": ("relative tolerance", ""), "solver.atol": ("absolute tolerance", ""),
+    "solver.fixed_step": (r"step $\Delta t$", "s"), "solver.max_step": ("longest step", "s"), "solver.method": ("method", ""),
+    "n_rhs": ("right-hand sides", ""), "wall_seconds": ("wall time", "s"), "t_reached": ("time reached", "s"),
+}
+VERSION_ATTRIBUTES = [
+    "program_version", "git_commit", "compiler", "compiler_options", "sundials_version", "hdf5_version", "hostname", "created",
+]
+
+
+def unit_text(unit: str) -> str:
+    """'kg m2 s-1' as 'kg m²/s'."""
+    above, below = [], []
+    for word in unit.split():
+        name, power = re.fullmatch(r"(.*?)(-?\d*)", word).groups()
+        exponent = int(power or 1)
+        digits = "" if abs(exponent) == 1 else str(abs(exponent)).translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹"))
+        (above if exponent > 0 else below).append(name + digits)
+    if not below:
+        return " ".join(above)
+    bottom = " ".join(below)
+    return f"{' '.join(above) or '1'}/{bottom if len(below) == 1 else f'({bottom})'}"
+
+
+def text_of(value: Any) -> Any:
+    """Texts and numbers of HDF5 as Python's."""
+    if isinstance(value, bytes):
+        return value.decode(errors="replace").rstrip("\0 ")
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def split_name(text: str) -> tuple[str, int | None]:
+    """'phi(4)' -> 'phi', 4; 'omega' -> 'omega', None."""
+    match = re.fullmatch(r"\s*(\w+)\s*(?:\(\s*(\d+)\s*\))?\s*", text)
+    if match is None:
+        raise DataError(f"'{text}' is no quantity; write for example omega or phi(4)")
+    return match[1], None if match[2] is None else int(match[2])
+
+
+def symbol_text(name: str, rod: int | None = None) -> str:
+    """The symbol of a quantity, in matplotlib's notation."""
+    symbol = SYMBOLS.get(name)
+    if symbol is None:
+        return name if rod is None else f"{name}({rod})"
+    return f"${symbol}$" if rod is None else f"${symbol}_{{{rod}}}$"
+
+
+class Run:
+    """One run file. Data sets are read when they are asked for."""
+
+    def __init__(self, path: str | pathlib.Path, file: h5py.File):
+        self.path = pathlib.Path(path)
+        self.file = file
+        if "case" in file and TIME not in file:
+            raise DataError(f"{path}: is a sweep file; this script reads run files")
+        for name in (TIME, "phi"):
+            if name not in file:
+                raise DataError(f"{path}: is no run file of Rodyn: no data set '{name}'")
+        self.n_rods = file["phi"].shape[1]
+        self._scene: dict[str, list[Group]] | None = None
+
+    @property
+    def time(self) -> np.ndarray:
+        return self.rows(TIME)
+
+    @property
+    def title(self) -> str:
+        return self.attribute("title", "") or self.path.stem
+
+    @property
+    def status(self) -> str:
+        return self.attribute("status", "unknown")
+
+    @property
+    def has_ledger(self) -> bool:
+        return all(name in self.file for name in LEDGER_SYMBOLS)
+
+    def attribute(self, name: str, default: Any = None) -> Any:
+        return text_of(self.file.attrs[name]) if name in self.file.attrs else default
+
+    def attributes(self) -> dict[str, Any]:
+        return {name: text_of(value) for name, value in self.file.attrs.items()}
+
+    def solver(self) -> dict[str, Any]:
+        """What the solver did; empty if the file does not say."""
+        group = self.file.get("solver")
+        return {} if group is None else {name: text_of(value) for name, value in group.attrs.items()}
+
+    def rows(self, name: str, rows: Any = ()) -> np.ndarray:
+        """A data set, or some of its rows (strictly rising)."""
+        if name not in self.file:
+            raise DataError(f"{self.path}: no data set '{name}'" + self._why_missing(name))
+        return self.file[name][rows]
+
+    def _why_missing(self, name: str) -> str:
+        if name in LEDGER_SYMBOLS:
+            return "; the case was run with ledger = .false."
+        return f"; it has {', '.join(sorted(k for k, v in self.file.items() if isinstance(v, h5py.Dataset)))}"
+
+    def quantity(self, text: str) -> Quantity:
+        """'omega', or 'phi(4)' of one rod."""
+        name, rod = split_name(text)
+        if name not in self.file:
+            self.rows(name)
+        data = self.file[name]
+        if data.ndim == 2 and rod is None:
+            raise DataError(f"{self.path}: '{name}' has one column per rod: write {name}(1) to {name}({self.n_rods})")
+        if data.ndim == 1 and rod is not None:
+            raise DataError(f"{self.path}: '{name}' does not belong to a rod: write {name}")
+        if rod is not None and not 1 <= rod <= self.n_rods:
+            raise DataError(f"{self.path}: no rod {rod}: the chain has rods 1 to {self.n_rods}")
+        values = data[()] if rod is None else data[:, rod - 1]
+        unit = text_of(data.attrs.get("units", UNITS.get(name, "")))
+        meaning = MEANINGS.get(name, name) + ("" if rod is None else f" of rod {rod}")
+        return Quantity(text.replace(" ", ""), values, symbol_text(name, rod), unit_text(unit), meaning)
+
+    def scene(self) -> dict[str, list[Group]]:
+        """The namelist with every value that was used."""
+        if self._scene is None:
+            text = self.attribute("resolved_input")
+            if text is None:
+                raise DataError(f"{self.path}: no attribute 'resolved_input', so the scene is not known")
+            self._scene = read_namelist(text)
+        return self._scene
+
+    def group(self, name: str) -> Group:
+        return self.scene().get(name, [{}])[0]
+
+    def per_rod(self, name: str) -> np.ndarray:
+        """A key of &chain as an array over the rods (or nodes 1..n, or hinges 0..n-1)."""
+        values = self.group("chain").get(name)
+        if values is None:
+            raise DataError(f"{self.path}: its resolved input has no &chain {name}")
+        values = np.atleast_1d(np.asarray(values, dtype=float))
+        return np.full(self.n_rods, values[0]) if values.size == 1 else values
+
+    def number(self, group: str, key: str, default: float | None = None) -> float | None:
+        value = self.group(group).get(key, default)
+        return default if value is None else float(value)
+
+    def nearest_row(self, t: float) -> int:
+        """The row closest to time t, which must lie within the run."""
+        time = self.time
+        margin = 1e-9 * max(1.0, abs(time[-1]))
+        if not time[0] - margin <= t <= time[-1] + margin:
+            raise DataError(f"{self.path}: no row at t = {t:g} s: it has {time.size} rows, {time[0]:g} to {time[-1]:g} s")
+        return int(np.argmin(np.abs(time - t)))
+
+
+class Sweep:
+    """One sweep file. `axes` maps each axis to its value in every case."""
+
+    def __init__(self, path: str | pathlib.Path, file: h5py.File):
+        self.path = pathlib.Path(path)
+        self.file = file
+        if "status" not in file or not isinstance(file["status"], h5py.Dataset):
+            kind = "a run file; this script reads sweep files" if TIME in file else "no sweep file of Rodyn: no data set 'status'"
+            raise DataError(f"{path}: is {kind}")
+        self.status = texts(file["status"])
+        self.axes = {name.removeprefix("param_"): column(file[name]) for name in file if name.startswith("param_")}
+        self.probe_times = np.atleast_1d(file["probe_time"][()]) if "probe_time" in file else np.array([np.nan])
+
+    @property
+    def title(self) -> str:
+        return text_of(self.file.attrs.get("title", "")) or self.path.stem
+
+    @property
+    def n_cases(self) -> int:
+        return len(self.status)
+
+    @property
+    def failed(self) -> np.ndarray:
+        """Which cases were tried and gave no result."""
+        return np.array([status not in ("done", "pending", "running", "") for status in self.status])
+
+    @property
+    def done(self) -> np.ndarray:
+        return np.array([status == "done" for status in self.status])
+
+    def messages(self) -> list[str]:
+        return texts(self.file["message"]) if "message" in self.file else [""] * self.n_cases
+
+    def attributes(self) -> dict[str, Any]:
+        return {name: text_of(value) for name, value in self.file.attrs.items()}
+
+    def axis(self, name: str) -> np.ndarray:
+        if name not in self.axes:
+            raise DataError(f"{self.path}: no axis '{name}'; it has {', '.join(self.axes) or 'none'}")
+        return self.axes[name]
+
+    def probe(self, t: float | None) -> int:
+        """Index of a probe time; by default of the last one."""
+        if t is None:
+            return self.probe_times.size - 1
+        i = int(np.argmin(np.abs(self.probe_times - t)))
+        if not abs(self.probe_times[i] - t) <= 1e-9 * max(1.0, abs(t)):
+            known = ", ".join(f"{p:g}" for p in self.probe_times)
+            raise DataError(f"{self.path}: no probe time {t:g} s; it has {known} s")
+        return i
+
+    def quantity(self, text: str, t: float | None = None) -> Quantity:
+        """A state at a probe time, 'phi(4)', or a number of each case, 'n_rhs'; NaN where a case has none."""
+        name, rod = split_name(text)
+        if name not in self.file or name.startswith("param_"):
+            known = ", ".join(n for n in self.file if n in SYMBOLS or n in PARAMETERS)
+            raise DataError(f"{self.path}: no data set '{name}'; it has {known}")
+        data = self.file[name]
+        if data.ndim == 3 and rod is None:
+            raise DataError(f"{self.path}: '{name}' has one column per rod: write {name}(1) to {name}({data.shape[2]})")
+        if data.ndim < 3 and rod is not None:
+            raise DataError(f"{self.path}: '{name}' does not belong to a rod: write {name}")
+        if rod is not None and not 1 <= rod <= data.shape[2]:
+            raise DataError(f"{self.path}: no rod {rod}: the chains have rods 1 to {data.shape[2]}")
+        if data.ndim == 1:
+            values = data[()].astype(float)
+        else:
+            values = data[:, self.probe(t)] if rod is None else data[:, self.probe(t), rod - 1]
+        values = np.where(self.done, values, np.nan)
+        words, unit = PARAMETERS.get(name, (symbol_text(name, rod), UNITS.get(name, "")))
+        unit = text_of(data.attrs.get("units", unit))
+        unit = "" if unit in ("1", "none") else unit
+        meaning = MEANINGS.get(name, words) + ("" if rod is None else f" of rod {rod}")
+        return Quantity(text.replace(" ", ""), values, words, unit_text(unit), meaning)
+
+    def axis_label(self, name: str) -> str:
+        key, index = re.fullmatch(r"(.*?)(\(\d+\))?", name).groups()
+        words, unit = PARAMETERS.get(key, (name, ""))
+        if index and words.endswith("$"):
+            words = f"{words[:-1]}_{{{index[1:-1]}}}$"
+        data = self.file[f"param_{name}"]
+        unit = text_of(data.attrs.get("units", unit))
+        return f"{words} [{unit_text(unit)}]" if unit not in ("", "1", "none") else words
+
+    def chosen(self, where: Mapping[str, str | float]) -> np.ndarray:
+        """Which cases have these values on these axes."""
+        keep = np.ones(self.n_cases, dtype=bool)
+        for name, wanted in where.items():
+            values = self.axis(name)
+            if values.dtype.kind in "fiu":
+                try:
+                    match = np.isclose(values.astype(float), float(wanted), rtol=1e-6, atol=0)
+                except ValueError:
+                    raise DataError(f"{self.path}: axis '{name}' holds numbers, not '{wanted}'") from None
+            else:
+                match = values == str(wanted)
+            if not match.any():
+                known = ", ".join(str(v) for v in distinct(values))
+                raise DataError(f"{self.path}: no case with {name} = {wanted}; it has {known}")
+            keep &= match
+        return keep
+
+    def series(self, text: str, axes: Sequence[str], where: Mapping[str, str | float], t: float | None) -> list[Series]:
+        """Split the chosen cases by all axes that change and are not in `axes`."""
+        keep = self.chosen(where)
+        others = [a for a in self.axes if a not in axes and a not in where and len(distinct(self.axes[a][keep])) > 1]
+        groups: dict[tuple, list[int]] = {}
+        for case in np.flatnonzero(keep):
+            groups.setdefault(tuple(text_of(self.axes[a][case]) for a in others), []).append(int(case))
+        quantity = self.quantity(text, t)
+        return [
+            Series(dict(zip(others, key, strict=True)), np.array(cases), quantity._replace(values=quantity.values[cases]))
+            for key, cases in groups.items()
+        ]
+
+
+class Series(NamedTuple):
+    """Cases of a sweep that agree on all axes but those of the plot."""
+
+    where: dict[str, Any]
+    cases: np.ndarray
+    quantity: Quantity
+
+    @property
+    def label(self) -> str:
+        return ", ".join(
+            value if isinstance(value, str) else f"{name.rpartition('.')[2]} = {value:g}" for name, value in self.where.items()
+        )
+
+
+class BenchmarkScene(NamedTuple):
+    """Runs of several methods at several tolerances of one scene."""
+
+    name: str
+    title: str
+    method: np.ndarray
+    rtol: np.ndarray
+    seconds: np.ndarray
+    errors: dict[str, tuple[str, np.ndarray]]  # data set: label, values
+
+
+BENCHMARK_ERRORS = {
+    "error_phi": r"error of the chord angles $\varphi$ [rad]",
+    "error_alpha_rate": r"error of the slope rates $\dot{\alpha}$ [rad/s]",
+}
+
+
+def read_benchmark(path: str | pathlib.Path) -> list[BenchmarkScene]:
+    """A benchmark file, docs/postproc.md: one group per scene."""
+    with opened(path) as file:
+        scenes = []
+        for name, group in file.items():
+            if not isinstance(group, h5py.Group) or "seconds" not in group:
+                continue
+            for needed in ("method", "rtol"):
+                if needed not in group:
+                    raise DataError(f"{path}: scene '{name}' has no data set '{needed}'")
+            errors = {e: (label, group[e][()]) for e, label in BENCHMARK_ERRORS.items() if e in group}
+            if not errors:
+                raise DataError(f"{path}: scene '{name}' has neither {' nor '.join(BENCHMARK_ERRORS)}")
+            title = text_of(group.attrs.get("title", "")) or name
+            method = np.array(texts(group["method"]))
+            scenes.append(BenchmarkScene(name, title, method, group["rtol"][()], group["seconds"][()], errors))
+    if not scenes:
+        raise DataError(f"{path}: is no benchmark file: no group with a data set 'seconds'")
+    return scenes
+
+
+def texts(data: h5py.Dataset) -> list[str]:
+    return [text_of(value) for value in np.atleast_1d(data[()]).astype(object)]
+
+
+def column(data: h5py.Dataset) -> np.ndarray:
+    """Numbers as they are, texts as an array of str."""
+    return np.array(texts(data)) if data.dtype.kind in "SO" else np.atleast_1d(data[()])
+
+
+def distinct(values: np.ndarray) -> list[Any]:
+    """Distinct values: numbers sorted, texts in their order of appearance; NaN is left out."""
+    if values.dtype.kind in "fiu":
+        return [v.item() for v in np.unique(values) if not np.isnan(v)]
+    return list(dict.fromkeys(str(v) for v in values))
+
+
+def opened(path: str | pathlib.Path) -> h5py.File:
+    """The file, or a DataError that says why not."""
+    if not pathlib.Path(path).is_file():
+        raise DataError(f"{path}: there is no such file")
+    try:
+        return h5py.File(path, "r")
+    except OSError as error:
+        why = "is not an HDF5 file" if not h5py.is_hdf5(path) else f"cannot be read: {error}"
+        raise DataError(f"{path}: {why}") from None
+
+
+@contextmanager
+def open_run(path: str | pathlib.Path) -> Iterator[Run]:
+    with opened(path) as file:
+        yield Run(path, file)
+
+
+@contextmanager
+def open_sweep(path: str | pathlib.Path) -> Iterator[Sweep]:
+    path = pathlib.Path(path)
+    with opened(path / "sweep.h5" if path.is_dir() else path) as file:
+        yield Sweep(path, file)
+
+
+def is_sweep(path: str | pathlib.Path) -> bool:
+    """True for a sweep, false for a run; anything else is a DataError."""
+    path = pathlib.Path(path)
+    if path.is_dir():
+        return True
+    with opened(path) as file:
+        if TIME not in file and "status" in file:
+            return True
+        Run(path, file)
+    return False

@@ -1,0 +1,136 @@
+"""One style for all pictures: sizes, fonts, colours, line styles; how figures are made and saved.
+
+Colours are Okabe and Ito's, which colour-blind readers can tell apart, in an order that also changes in grey; every
+line has its own dash pattern besides. Figures are drawn without a display and without pyplot.
+"""
+
+from __future__ import annotations
+
+import pathlib
+from typing import Any
+
+import matplotlib
+import numpy as np
+from cycler import cycler
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+COLOURS = ["#000000", "#0072B2", "#D55E00", "#009E73", "#E69F00", "#56B4E9", "#CC79A7"]
+DASHES: list[Any] = ["-", (0, (5, 1.6)), (0, (6, 1.5, 1.2, 1.5)), (0, (1.4, 1.2)), (0, (9, 2)), (0, (3, 1.2, 1, 1.2, 1, 1.2)), (0, (2.5, 2.5))]
+MARKERS = ["o", "s", "^", "D", "v", "P", "X"]
+FAILED = "#B2182B"
+GREY = "#767676"
+SEQUENCE = "cividis"  # for what has an order; also monotonic in grey
+WIDTH = 7.2  # inches, both columns of a page
+FORMATS = (".pdf", ".png")
+
+matplotlib.rcParams.update({
+    "font.family": "DejaVu Sans",
+    "mathtext.fontset": "dejavusans",
+    "font.size": 9,
+    "axes.titlesize": 9,
+    "axes.labelsize": 9,
+    "figure.titlesize": 10,
+    "figure.dpi": 100,
+    "legend.fontsize": 8,
+    "legend.frameon": True,
+    "legend.framealpha": 0.85,
+    "legend.edgecolor": "none",
+    "legend.handlelength": 2.6,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+    "axes.prop_cycle": cycler(color=COLOURS) + cycler(linestyle=DASHES),
+    "axes.linewidth": 0.7,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#D9D9D9",
+    "grid.linewidth": 0.5,
+    "lines.linewidth": 1.2,
+    "lines.markersize": 4.5,
+    "axes.formatter.use_mathtext": True,
+    "axes.formatter.limits": (-4, 5),
+    "savefig.dpi": 160,
+    "pdf.fonttype": 42,
+    "svg.fonttype": "path",
+    "path.simplify": True,
+})
+
+
+def new_figure(rows: int = 1, columns: int = 1, *, width: float = WIDTH, height: float | None = None, **options: Any) -> tuple[Figure, np.ndarray]:
+    """A figure and its axes, as a two-dimensional array."""
+    figure = Figure(figsize=(width, height or 0.6 + 2.1 * rows), layout="constrained")
+    return figure, figure.subplots(rows, columns, squeeze=False, **options)
+
+
+def line_style(i: int) -> dict[str, Any]:
+    """Colour and dashes of line number i."""
+    return {"color": COLOURS[i % len(COLOURS)], "linestyle": DASHES[(i + i // len(COLOURS)) % len(DASHES)]}
+
+
+def mark_style(i: int) -> dict[str, Any]:
+    return line_style(i) | {"marker": MARKERS[i % len(MARKERS)]}
+
+
+def sequence_colours(n: int) -> list[Any]:
+    """n colours from dark to light, for times in their order; the lightest are left out."""
+    colour_map = matplotlib.colormaps[SEQUENCE]
+    return [colour_map(x) for x in np.linspace(0.0, 0.82, n)]
+
+
+def legend_above(axes: Axes, **options: Any) -> None:
+    """A legend in a row above the axes, where no data are."""
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.15, columnspacing=1.2, **({"ncols": 4} | options))
+
+
+def save(figure: Figure, out: str | pathlib.Path) -> list[pathlib.Path]:
+    """Save as `out`; without one of the known suffixes as vector PDF and as PNG. The paths are kept as figure.saved."""
+    out = pathlib.Path(out)
+    known = (".pdf", ".png", ".svg")
+    paths = [out] if out.suffix in known else [out.with_name(out.name + suffix) for suffix in FORMATS]
+    for path in paths:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # No time of creation, so that the same picture gives the same file.
+        figure.savefig(path, metadata={".png": {"Software": None}, ".pdf": {"CreationDate": None}, ".svg": {"Date": None}}[path.suffix])
+    figure.saved = paths
+    return paths
+
+
+def envelope(x: np.ndarray, y: np.ndarray, points: int = 4000) -> tuple[np.ndarray, np.ndarray]:
+    """Thin out a long line without losing a peak: first, lowest, highest and last point of each of many short pieces."""
+    if x.size <= points:
+        return x, y
+    keep = envelope_rows(y, points=points)
+    return x[keep], y[keep]
+
+
+def envelope_rows(*columns: np.ndarray, points: int = 4000) -> np.ndarray:
+    """Rows that `envelope` keeps; extremes of every column are among them."""
+    n = columns[0].size
+    if n <= points:
+        return np.arange(n)
+    pieces = max(1, points // (2 + 2 * len(columns)))
+    edges = np.linspace(0, n, pieces + 1).astype(int)
+    length = int(np.max(np.diff(edges)))
+    rows = np.minimum(edges[:-1, None] + np.arange(length), edges[1:, None] - 1)  # (pieces, length)
+    keep = [edges[:-1], edges[1:] - 1]
+    for values in columns:
+        pieces_of = values[rows]
+        for fill, choose in ((np.inf, np.argmin), (-np.inf, np.argmax)):
+            best = choose(np.where(np.isnan(pieces_of), fill, pieces_of), axis=1)
+            keep.append(rows[np.arange(pieces), best])
+    return np.unique(np.concatenate(keep))
+
+
+def note(axes: Axes, text: str) -> None:
+    """A remark inside the axes."""
+    axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", color=GREY, fontsize=8)
+
+
+def status_suffix(status: str, t_reached: float) -> str:
+    """What a title must say of a run that is not complete."""
+    return "" if status == "done" else f" ({status} at t = {t_reached:.4g} s)"
+
+
+def shorten(text: str, width: int = 80) -> str:
+    """A title that fits on the line."""
+    return text if len(text) <= width else text[: width - 1].rstrip() + "…"
