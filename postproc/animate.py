@@ -13,12 +13,12 @@ import sys
 import command
 import numpy as np
 import style
-from geometry import limits, shapes
+from geometry import limits, shapes, tip_path
 from matplotlib.animation import FFMpegWriter, PillowWriter
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from rodyn_data import DataError, Run, open_run
-from shape import FRAMES, axis_names, draw_shape, is_rigid, node_radii
+from shape import FRAMES, axis_names, draw_body, draw_shape, is_rigid, node_radii
 
 
 def plot(file: str | pathlib.Path, out: str | pathlib.Path, magnification: float = 1.0, frame: str = "inertial",
@@ -40,23 +40,25 @@ def record(run: Run, out: pathlib.Path, magnification: float, frame: str, frames
     rows = np.unique([int(np.argmin(np.abs(time - t))) for t in np.linspace(time[0], time[-1], frames)])
     found = shapes(run, rows, magnification, frame)
     left, right, bottom, top = limits(found)
-    figure, grid = style.new_figure(width=5.6, height=float(np.clip(0.9 + 4.9 * (top - bottom) / (right - left), 2.4, 5.6)))
+    height = float(np.clip(0.9 + 4.2 * (top - bottom) / (right - left), 2.4, 5.2))
+    figure, grid = style.new_figure(width=4.8, height=height)
     FigureCanvasAgg(figure)
     axes, radii = grid[0, 0], node_radii(run)
     bending = "rigid rods" if is_rigid(run) else f"bending × {magnification:g}"
-    figure.suptitle(style.shorten(run.title, 62) + style.status_suffix(run.status, time[-1]))
+    title = style.shorten(run.title, 50) + style.status_suffix(run.status, time[-1])
     out.parent.mkdir(parents=True, exist_ok=True)
     writer = (PillowWriter if out.suffix == ".gif" else FFMpegWriter)(fps=fps)
-    tips = np.array([s.nodes[-1] for s in found])
+    path_time, path = tip_path(run, frame)
     digits = max(0, 2 - int(np.floor(np.log10(max(time[-1] - time[0], 1e-9)))))
     figure.times = []
     with writer.saving(figure, str(out), dpi):
         for i, shape in enumerate(found):
             axes.clear()
-            axes.plot(*tips[: i + 1].T, color=style.GREY, linestyle="-", linewidth=0.6)
+            axes.plot(*path[path_time <= shape.time].T, color=style.GREY, linestyle="-", linewidth=0.6)
+            draw_body(axes, shape, style.COLOURS[1])
             draw_shape(axes, shape, style.COLOURS[1], radii)
             axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal", **axis_names(frame))
-            axes.set_title(f"t = {shape.time:.{digits}f} s, {frame} frame, {bending}", loc="left")
+            axes.set_title(f"{title}\nt = {shape.time:.{digits}f} s, {frame} frame, {bending}", loc="left")
             writer.grab_frame()
             figure.times.append(shape.time)
             if i == 0:

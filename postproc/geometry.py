@@ -82,6 +82,21 @@ def turned(shape: Shape, displacement: np.ndarray, rotation: float) -> Shape:
     return Shape(shape.time, move(shape.centre), move(shape.body), move(shape.nodes), move(shape.rods))
 
 
+def tip_path(run: Run, frame: str = "moving", rows: int = 4000) -> tuple[np.ndarray, np.ndarray]:
+    """Times and places (row, 2) of the outermost node, at no more than so many rows."""
+    every = slice(None, None, max(1, -(-run.time.size // rows)))
+    phi = run.rows("phi", every)
+    length = run.per_rod("length")
+    path = np.stack([run.number("spacecraft", "hinge_x", 0.0) + np.cos(phi) @ length,
+                     run.number("spacecraft", "hinge_y", 0.0) + np.sin(phi) @ length], axis=-1)
+    if frame == "inertial":
+        path += np.stack([run.rows("displacement_x", every), run.rows("displacement_y", every)], axis=-1)
+        theta = run.rows("rotation", every)
+        c, s = np.cos(theta), np.sin(theta)
+        path = np.stack([c * path[:, 0] - s * path[:, 1], s * path[:, 0] + c * path[:, 1]], axis=-1)
+    return run.rows("time", every), path
+
+
 def limits(found: list[Shape], margin: float = 0.06) -> tuple[float, float, float, float]:
     """x and y limits that hold all shapes."""
     points = np.concatenate([p.reshape(-1, 2) for s in found for p in (s.centre[None], s.body, s.nodes, s.rods)])

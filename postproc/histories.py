@@ -18,10 +18,10 @@ from matplotlib.figure import Figure
 from rodyn_data import Quantity, Run, open_run
 
 SPACECRAFT = [
-    ("velocity of the spacecraft, moving axes", ["velocity_x", "velocity_y"]),
-    ("angular velocity", ["omega"]),
-    ("displacement of the spacecraft, moving axes", ["displacement_x", "displacement_y"]),
-    ("rotation", ["rotation"]),
+    ("velocity, moving axes", ["velocity_x", "velocity_y"]),
+    ("angular velocity of the spacecraft", ["omega"]),
+    ("displacement, moving axes", ["displacement_x", "displacement_y"]),
+    ("rotation of the spacecraft", ["rotation"]),
 ]
 
 
@@ -49,7 +49,7 @@ def draw(run: Run, panels: Sequence[tuple[str, Sequence[Quantity]]]) -> Figure:
     rows = -(-len(panels) // columns)
     figure, grid = style.new_figure(rows, columns, sharex=True)
     time = run.time
-    figure.suptitle(style.shorten(run.title) + style.status_suffix(run.status, time[-1]))
+    figure.suptitle("Motion: " + style.shorten(run.title, 70) + style.status_suffix(run.status, time[-1]))
     for axes, (title, quantities) in zip(grid.flat, panels, strict=False):
         draw_panel(axes, time, title, quantities)
     for axes in grid.flat[len(panels):]:
@@ -68,7 +68,7 @@ def draw_panel(axes: Axes, time, title: str, quantities: Sequence[Quantity]) -> 
     axes.margins(x=0)
     axes.set_title(title, loc="left")
     if len(quantities) > 1:
-        axes.legend(loc="best", ncols=2)
+        style.legend_above(axes)
     if time.size == 1:
         axes.plot(time, quantities[0].values, "o", color=style.COLOURS[0])
 

@@ -38,15 +38,19 @@ def draw(run: Run, times: Sequence[float], magnification: float, frame: str) -> 
     rows = np.unique([run.nearest_row(t) for t in (times or np.linspace(time[0], time[-1], 5))])
     found = shapes(run, rows, magnification, frame)
     left, right, bottom, top = limits(found)
-    figure, grid = style.new_figure(height=np.clip(1.3 + 5.4 * (top - bottom) / (right - left), 2.6, 6.4))
+    figure, grid = style.new_figure(height=np.clip(1.1 + 5.3 * (top - bottom) / (right - left), 2.4, 6.4))
     axes = grid[0, 0]
     when = f" at t = {found[0].time:.6g} s" if len(found) == 1 else ""
-    figure.suptitle(style.shorten(run.title, 60) + style.status_suffix(run.status, time[-1]))
     bending = "rigid rods" if is_rigid(run) else f"bending × {magnification:g}"
-    axes.set_title(f"shape{when}, {frame} frame, {bending}", loc="left")
+    title = style.shorten(run.title, 60) + style.status_suffix(run.status, time[-1])
+    axes.set_title(f"{title}\nShape{when}, {frame} frame, {bending}", loc="left")
     colours = style.sequence_colours(len(found))
     radii = node_radii(run)
+    if frame == "moving":
+        draw_body(axes, found[0], style.GREY)
     for i, shape in enumerate(found):
+        if frame == "inertial":
+            draw_body(axes, shape, colours[i])
         draw_shape(axes, shape, colours[i], radii, style.DASHES[i % len(style.DASHES)])
     axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal", **axis_names(frame))
     axes.legend(handles=time_handles(found, colours) + mark_handles(radii), loc="center left", bbox_to_anchor=(1.01, 0.5))
@@ -71,9 +75,8 @@ def node_radii(run: Run) -> np.ndarray:
     return (7.0 if run.n_rods <= 12 else 3.5) * np.sqrt(mass / largest)
 
 
-def draw_shape(axes: Axes, shape: Shape, colour, radii: np.ndarray, dashes="-") -> None:
-    """Rods as curves, hinges as open and node masses as filled circles, the spacecraft as a square."""
-    few = len(shape.rods) <= 12
+def draw_body(axes: Axes, shape: Shape, colour) -> None:
+    """The spacecraft as a square with its centre of mass; a fixed one as a small block at the hinge."""
     if shape.body.size:
         axes.add_patch(Polygon(shape.body, closed=True, facecolor=colour, alpha=0.18, edgecolor="none"))
         axes.plot(*shape.body.T, color=colour, linestyle="-", linewidth=0.9)
@@ -81,6 +84,11 @@ def draw_shape(axes: Axes, shape: Shape, colour, radii: np.ndarray, dashes="-") 
         axes.plot(*np.array([shape.centre, shape.nodes[0]]).T, color=colour, linestyle=":", linewidth=0.7)
     else:
         axes.plot(*shape.nodes[0], marker="s", markersize=9, markerfacecolor="#DDDDDD", markeredgecolor=colour)
+
+
+def draw_shape(axes: Axes, shape: Shape, colour, radii: np.ndarray, dashes="-") -> None:
+    """Rods as curves, hinges as open and node masses as filled circles."""
+    few = len(shape.rods) <= 12
     curve = np.concatenate(list(shape.rods))
     axes.plot(*curve.T, color=colour, linestyle=dashes, linewidth=1.5 if few else 1.2, label=f"t = {shape.time:.6g} s")
     for node, size in zip(shape.nodes[1:], radii, strict=True):

@@ -62,7 +62,7 @@ def draw(run: Run, quantities: Sequence[Quantity], start: float | None, highest:
         except DataError as error:
             raise DataError(f"{run.path}: {error}") from None
         draw_panel(axes, quantity, omega, amplitude)
-        upper = highest or 1.03 * min(omega[-1], np.max(frequencies, initial=0.0) or omega[-1])
+        upper = highest or min(omega[-1], 1.1 * np.max(frequencies, initial=0.0) or omega[-1])
         lower = omega[1]
         axes.set_xlim(lower, upper)
         mark_frequencies(axes, frequencies[(frequencies <= upper) & (frequencies >= lower)], label=i == 0)
@@ -81,7 +81,7 @@ def draw_panel(axes: Axes, quantity: Quantity, omega: np.ndarray, amplitude: np.
     if not np.any(amplitude > 0):
         style.note(axes, "zero at all times")
         return
-    axes.semilogy(*style.envelope(omega[1:], amplitude[1:], points=6000), **style.line_style(1) | {"linewidth": 0.9})
+    axes.semilogy(*style.envelope(omega[1:], amplitude[1:], points=6000), color=style.COLOURS[1], linestyle="-", linewidth=0.9)
     top = amplitude[1:].max()
     axes.set_ylim(max(amplitude[1:][amplitude[1:] > 0].min() / 2, 1e-9 * top), 3 * top)
 
@@ -89,7 +89,7 @@ def draw_panel(axes: Axes, quantity: Quantity, omega: np.ndarray, amplitude: np.
 def mark_frequencies(axes: Axes, frequencies: np.ndarray, label: bool) -> None:
     for i, frequency in enumerate(frequencies):
         axes.axvline(frequency, color=style.COLOURS[2], linestyle=(0, (4, 2)), linewidth=0.7, zorder=1,
-                     label="natural frequencies at the start" if i == 0 else None)
+                     label="natural frequencies, at rest in the initial shape" if i == 0 else None)
     if label and frequencies.size:
         style.legend_above(axes)
 

@@ -78,8 +78,11 @@ def sequence_colours(n: int) -> list[Any]:
 
 
 def legend_above(axes: Axes, **options: Any) -> None:
-    """A legend in a row above the axes, where no data are."""
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.15, columnspacing=1.2, **({"ncols": 4} | options))
+    """A legend in rows between the axes and their title, where no data are."""
+    options = {"ncols": 4} | options
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.15, borderpad=0.15, columnspacing=1.4, **options)
+    rows = -(-len(axes.get_legend_handles_labels()[1]) // options["ncols"])
+    axes.set_title(axes.get_title(loc="left"), loc="left", pad=5 + 12.5 * rows)
 
 
 def save(figure: Figure, out: str | pathlib.Path) -> list[pathlib.Path]:
