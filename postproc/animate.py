@@ -49,7 +49,8 @@ def record(run: Run, out: pathlib.Path, magnification: float, frame: str, frames
     out.parent.mkdir(parents=True, exist_ok=True)
     writer = (PillowWriter if out.suffix == ".gif" else FFMpegWriter)(fps=fps)
     path_time, path = tip_path(run, frame)
-    digits = max(0, 2 - int(np.floor(np.log10(max(time[-1] - time[0], 1e-9)))))
+    span = time[-1] - time[0]
+    digits = max(0, 2 - int(np.floor(np.log10(span)))) if span > 0 else 3
     figure.times = []
     with writer.saving(figure, str(out), dpi):
         for i, shape in enumerate(found):

@@ -334,13 +334,18 @@ class Sweep:
             keep &= match
         return keep
 
-    def series(self, text: str, axes: Sequence[str], where: Mapping[str, str | float], t: float | None) -> list[Series]:
-        """Split the chosen cases by all axes that change and are not in `axes`."""
+    def split(self, axes: Sequence[str], where: Mapping[str, str | float]) -> tuple[list[str], dict[tuple, list[int]]]:
+        """The other axes that change among the chosen cases, and the cases by their values on them."""
         keep = self.chosen(where)
         others = [a for a in self.axes if a not in axes and a not in where and len(distinct(self.axes[a][keep])) > 1]
         groups: dict[tuple, list[int]] = {}
         for case in np.flatnonzero(keep):
             groups.setdefault(tuple(text_of(self.axes[a][case]) for a in others), []).append(int(case))
+        return others, groups
+
+    def series(self, text: str, axes: Sequence[str], where: Mapping[str, str | float], t: float | None) -> list[Series]:
+        """One line for each set of values on the axes that are not in `axes`."""
+        others, groups = self.split(axes, where)
         quantity = self.quantity(text, t)
         return [
             Series(dict(zip(others, key, strict=True)), np.array(cases), quantity._replace(values=quantity.values[cases]))

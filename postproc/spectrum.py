@@ -36,12 +36,18 @@ def default_quantities(run: Run) -> list[str]:
     return [f"phi_rate({run.n_rods})", slope]
 
 
+def possible(time: np.ndarray) -> bool:
+    """Enough rows, at equal distances."""
+    steps = np.diff(time)
+    return time.size >= 16 and bool(np.ptp(steps) <= 1e-6 * steps.mean())
+
+
 def amplitudes(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Angular frequencies and amplitudes of the line without its straight part, Hann window: a sine of amplitude a gives a."""
     if time.size < 16:
         raise DataError(f"a spectrum needs 16 rows or more, here are {time.size}")
     steps = np.diff(time)
-    if np.ptp(steps) > 1e-6 * steps.mean():
+    if not possible(time):
         raise DataError("a spectrum needs rows at equal distances in time")
     window = np.hanning(time.size)
     straight = np.polynomial.Polynomial.fit(time, values, 1)(time)

@@ -93,6 +93,9 @@ def save(figure: Figure, out: str | pathlib.Path) -> list[pathlib.Path]:
     for path in paths:
         path.parent.mkdir(parents=True, exist_ok=True)
         # No time of creation, so that the same picture gives the same file.
+        # The layout found for the first format serves the others.
+        if path is not paths[0]:
+            figure.set_layout_engine("none")
         figure.savefig(path, metadata={".png": {"Software": None}, ".pdf": {"CreationDate": None}, ".svg": {"Date": None}}[path.suffix])
     figure.saved = paths
     return paths

@@ -1,0 +1,47 @@
+"""What the article prints: its tables 1 to 3, in its own units.
+
+Izvestiya vuzov. Mashinostroenie, 2017, No. 7 [688]. Tables 1 and 2 give a range over the steps it tried.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Printed(NamedTuple):
+    """One quantity at one time; `reference` comes from two independent integrators of high order."""
+
+    quantity: str
+    time: float
+    low: str
+    high: str
+    reference: str
+
+
+TABLE_1 = [
+    Printed("phi(4)", 1, "0.49135614", "0.49135614", "0.491356055226"),
+    Printed("alpha_rate(1)", 1, "0.39531", "0.39535", "0.394155296535"),
+]
+TABLE_2 = [
+    Printed("phi(4)", 30, "0.01361031", "0.01361079", "0.01360950381"),
+    Printed("phi(4)", 60, "0.48224758", "0.48224818", "0.48224726060"),
+    Printed("phi(4)", 120, "-0.22652622", "-0.22652627", "-0.22652528471"),
+    Printed("phi(4)", 240, "0.50494062", "0.50494089", "0.50494415485"),
+    Printed("alpha_rate(1)", 30, "-0.29849", "-0.29895", "-0.3051786"),
+    Printed("alpha_rate(1)", 60, "-1.01004", "-1.01022", "-1.0107406"),
+    Printed("alpha_rate(1)", 120, "-0.56372", "-0.56379", "-0.5632104"),
+    Printed("alpha_rate(1)", 240, "0.48113", "0.48115", "0.4811614"),
+]
+
+TABLE_3_TIME = 1.0
+TABLE_3_AXIS = "mass_ratio"
+# Degrees for the angles of the rods, m, rad.
+TABLE_3_QUANTITIES = [("phi(1)", "deg"), ("phi(4)", "deg"), ("displacement_x", "m"), ("rotation", "rad")]
+# Ratio: exact, lumped.
+TABLE_3 = {
+    2: (("-16.436", "21.920", "0.194", "4.046"), ("-18.122", "17.160", "0.192", "4.040")),
+    4: (("14.277", "22.652", "0.258", "2.240"), ("13.212", "20.339", "0.246", "2.255")),
+    8: (("-60.441", "-142.412", "0.104", "3.611"), ("-60.982", "-142.663", "0.103", "3.627")),
+    16: (("-44.534", "-180.568", "0.354", "2.849"), ("-44.189", "-180.659", "0.355", "2.844")),
+    32: (("-39.314", "-177.633", "0.627", "1.894"), ("-38.930", "-177.281", "0.629", "1.887")),
+}
