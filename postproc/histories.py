@@ -19,9 +19,9 @@ from rodyn_data import Quantity, Run, open_run
 
 SPACECRAFT = [
     ("velocity, moving axes", ["velocity_x", "velocity_y"]),
-    ("angular velocity of the spacecraft", ["omega"]),
+    ("angular velocity", ["omega"]),
     ("displacement, moving axes", ["displacement_x", "displacement_y"]),
-    ("rotation of the spacecraft", ["rotation"]),
+    ("rotation", ["rotation"]),
 ]
 
 
@@ -32,7 +32,7 @@ def plot(file: str | pathlib.Path, out: str | pathlib.Path, quantities: Sequence
             panels = by_unit([run.quantity(name) for name in quantities])
         else:
             panels = [(title, [run.quantity(name) for name in names]) for title, names in SPACECRAFT]
-        figure = draw(run, panels)
+        figure = draw(run, panels, "Time histories" if quantities else "Motion of the spacecraft")
     style.save(figure, out)
     return figure
 
@@ -44,12 +44,12 @@ def by_unit(quantities: Sequence[Quantity]) -> list[tuple[str, list[Quantity]]]:
     return [("; ".join(dict.fromkeys(q.meaning.split(" of rod")[0] for q in group)), group) for group in panels.values()]
 
 
-def draw(run: Run, panels: Sequence[tuple[str, Sequence[Quantity]]]) -> Figure:
+def draw(run: Run, panels: Sequence[tuple[str, Sequence[Quantity]]], title: str) -> Figure:
     columns = 2 if len(panels) > 1 else 1
     rows = -(-len(panels) // columns)
     figure, grid = style.new_figure(rows, columns, sharex=True)
     time = run.time
-    figure.suptitle("Motion: " + style.shorten(run.title, 70) + style.status_suffix(run.status, time[-1]))
+    figure.suptitle(f"{title}: " + style.shorten(run.title, 64) + style.status_suffix(run.status, time[-1]))
     for axes, (title, quantities) in zip(grid.flat, panels, strict=False):
         draw_panel(axes, time, title, quantities)
     for axes in grid.flat[len(panels):]:

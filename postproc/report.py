@@ -29,16 +29,19 @@ from spectrum import MANY_RODS
 CSS = """
 body { font: 15px/1.5 system-ui, sans-serif; color: #1b1b1b; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; }
 h1 { font-size: 1.5rem; margin-bottom: .2rem; } h2 { font-size: 1.15rem; margin-top: 2.2rem; border-bottom: 1px solid #ccc; }
-table { border-collapse: collapse; margin: .6rem 0; font-size: 13px; } caption { text-align: left; font-weight: 600; }
+table { border-collapse: collapse; margin: .6rem 0; font-size: 13px; } caption { text-align: left; font-weight: 600; white-space: nowrap; }
 th, td { padding: .2rem .7rem .2rem 0; text-align: left; vertical-align: top; border-bottom: 1px solid #e4e4e4; }
-td.n { text-align: right; font-variant-numeric: tabular-nums; } td { overflow-wrap: anywhere; }
-figure { margin: 1.2rem 0; } figure img { max-width: 100%; height: auto; } figcaption { font-size: 13px; color: #444; }
+th.n, td.n { text-align: right; font-variant-numeric: tabular-nums; } td { overflow-wrap: anywhere; }
+figure { margin: 1.2rem 0; } figure img { max-width: 100%; width: 50rem; height: auto; } figure img[src^="data:image/gif"] { width: auto; } figcaption { font-size: 13px; color: #444; }
 pre { background: #f6f6f6; padding: .8rem; overflow-x: auto; font-size: 12px; line-height: 1.4; }
 .failed { background: #fbe9e7; border-left: 4px solid #b2182b; padding: .5rem .8rem; } .done { color: #444; }
 @media print { body { max-width: none; } details { display: block; } }
 """
 MIME = {".svg": "image/svg+xml", ".png": "image/png", ".gif": "image/gif"}
 MOST_FAILURES = 200
+SOLVER_WORDS = {
+    "reason": "why this method", "n_steps": "steps", "n_rhs": "right-hand sides", "n_jac": "Jacobians", "wall_seconds": "wall time, s",
+}
 
 
 def plot(file: str | pathlib.Path, out: str | pathlib.Path, animation: bool = False) -> list[pathlib.Path]:
@@ -92,7 +95,7 @@ def run_facts(run: Run) -> list[tuple[str, str]]:
     facts += [(name, str(model[name])) for name in ("formulation", "inertia", "bending", "kernel") if name in model]
     for name in ("method", "reason", "rtol", "atol", "n_steps", "n_rhs", "n_jac", "wall_seconds"):
         if name in solver:
-            facts.append((name, number(solver[name]) if isinstance(solver[name], float) else str(solver[name])))
+            facts.append((SOLVER_WORDS.get(name, name), number(solver[name]) if isinstance(solver[name], float) else str(solver[name])))
     return facts
 
 
@@ -143,7 +146,7 @@ def shown(value: Any) -> str:
 
 
 def number(value: float) -> str:
-    return f"{value:.6g}"
+    return f"{value:.6g}".replace("-", "−")
 
 
 def figure_of(picture: Picture) -> str:
@@ -173,7 +176,7 @@ def grid(caption: str, head: Sequence[str], rows: Sequence[Sequence[str]], numbe
         "<tr>" + "".join(f'<td{" class=n" if i >= numbers_from else ""}>{html.escape(c)}</td>' for i, c in enumerate(row)) + "</tr>\n"
         for row in rows
     )
-    top = "<thead><tr>" + "".join(f"<th>{html.escape(c)}</th>" for c in head) + "</tr></thead>" if head else ""
+    top = "<thead><tr>" + "".join(f'<th{" class=n" if i >= numbers_from else ""}>{html.escape(c)}</th>' for i, c in enumerate(head)) + "</tr></thead>" if head else ""
     return f"<table><caption>{html.escape(caption)}</caption>{top}<tbody>{cells}</tbody></table>"
 
 
