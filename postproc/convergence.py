@@ -83,8 +83,9 @@ def fit_order(x: np.ndarray, error: np.ndarray, floor: float) -> Fit | None:
     """
     order = np.argsort(-x)
     good = [i for i in order if np.isfinite(error[i]) and error[i] > floor]
+    local = np.diff(np.log(error[good])) / np.diff(np.log(x[good])) if len(good) > 1 else np.array([])
     last = 0
-    while last + 1 < len(good) and error[good[last + 1]] < error[good[last]]:
+    while last < local.size and local[last] > 0.5 * np.median(local[: last + 1]) > 0:
         last += 1
     chosen = good[: last + 1][-MOST_FITTED:]
     if len(chosen) < 2:

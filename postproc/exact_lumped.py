@@ -78,7 +78,7 @@ def pair_up(sweep: Sweep, name: str, axis: str | None, where: Mapping[str, Any],
 
 def draw(sweep: Sweep, names: Sequence[str], axis: str | None, where: Mapping[str, Any], time: float | None) -> Figure:
     n = len(names)
-    figure, grid = style.new_figure(2, n, width=max(style.WIDTH * 0.6, 2.35 * n), height=4.6, sharex="col")
+    figure, grid = style.new_figure(2, n, width=max(style.WIDTH * 0.6, 2.35 * n), height=4.9, sharex="col")
     figure.suptitle(style.shorten(f"{sweep.title}: exact and lumped inertia, {probe_text(sweep, time)}{where_text(where)}", 34 * max(2, n)))
     total = int(sweep.chosen(where).sum())
     for i, name in enumerate(names):
@@ -93,9 +93,9 @@ def draw(sweep: Sweep, names: Sequence[str], axis: str | None, where: Mapping[st
         mark_failed(top, failed, total)
         top.set(ylabel=pair.exact.label)
         top.set_title(pair.exact.meaning.replace("along the moving ", "").replace(" of the spacecraft", ""), loc="left")
-        style.legend_above(top, handlelength=2.0, ncols=2)
         draw_difference(bottom, x, pair, failed)
         bottom.set(xlabel=sweep.axis_label(axis))
+    style.legend_below(figure, grid[0])
     return figure
 
 

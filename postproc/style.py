@@ -7,6 +7,7 @@ line has its own dash pattern besides. Figures are drawn without a display and w
 from __future__ import annotations
 
 import pathlib
+from collections.abc import Iterable
 from typing import Any
 
 import matplotlib
@@ -83,6 +84,15 @@ def legend_above(axes: Axes, **options: Any) -> None:
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.15, borderpad=0.15, columnspacing=1.4, **options)
     rows = -(-len(axes.get_legend_handles_labels()[1]) // options["ncols"])
     axes.set_title(axes.get_title(loc="left"), loc="left", pad=5 + 12.5 * rows)
+
+
+def legend_below(figure: Figure, panels: Iterable[Axes]) -> None:
+    """One legend for all panels, below them: each label once."""
+    found = {label: handle for axes in panels for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+    if found:
+        widest = max(len(label) for label in found) * 0.075 + 0.6  # inches
+        columns = max(1, min(len(found), int(0.95 * figure.get_figwidth() / widest)))
+        figure.legend(found.values(), found.keys(), loc="outside lower center", ncols=columns)
 
 
 def save(figure: Figure, out: str | pathlib.Path) -> list[pathlib.Path]:

@@ -56,14 +56,15 @@ def draw(sweep: Sweep, quantities: Sequence[str], axis: str, where: Mapping[str,
     rows = -(-len(quantities) // columns)
     figure, grid = style.new_figure(rows, columns, height=0.9 + 2.5 * rows)
     figure.suptitle(style.shorten(f"{sweep.title}: {probe_text(sweep, time)}{where_text(where)}", 90))
-    for i, (axes, name) in enumerate(zip(grid.flat, quantities, strict=False)):
-        draw_panel(axes, sweep, name, axis, where, time, legend=i == 0)
+    for axes, name in zip(grid.flat, quantities, strict=False):
+        draw_panel(axes, sweep, name, axis, where, time)
     for axes in grid.flat[len(quantities):]:
         axes.set_visible(False)
+    style.legend_below(figure, grid.flat[: len(quantities)])
     return figure
 
 
-def draw_panel(axes: Axes, sweep: Sweep, name: str, axis: str, where: Mapping[str, Any], time: float | None, legend: bool) -> None:
+def draw_panel(axes: Axes, sweep: Sweep, name: str, axis: str, where: Mapping[str, Any], time: float | None) -> None:
     found = sweep.series(name, [axis], where, time)
     if len(found) > MOST_LINES:
         others = ", ".join(found[0].where)
@@ -81,8 +82,6 @@ def draw_panel(axes: Axes, sweep: Sweep, name: str, axis: str, where: Mapping[st
     quantity = found[0].quantity
     axes.set(xlabel=sweep.axis_label(axis), ylabel=quantity.label)
     axes.set_title(quantity.meaning, loc="left")
-    if legend and axes.get_legend_handles_labels()[1] or failed:
-        style.legend_above(axes, ncols=2)
 
 
 class Places:

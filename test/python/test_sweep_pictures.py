@@ -1,0 +1,160 @@
+"""Pictures of sweeps and benchmarks show the numbers of their files; failed cases stay visible."""
+
+import convergence
+import exact_lumped
+import figures
+import heat_map
+import numpy as np
+import pytest
+import result_files
+import style
+import sweep_lines
+import work_precision
+from rodyn_data import DataError, open_sweep
+
+
+def labelled(axes):
+    return {line.get_label(): np.asarray(line.get_xydata()) for line in axes.lines}
+
+
+def crosses(axes):
+    """x of the marks of failed cases, and their label."""
+    for line in axes.lines:
+        if line.get_marker() == "x":
+            return np.asarray(line.get_xdata()).tolist(), line.get_label()
+    return [], ""
+
+
+@pytest.mark.parametrize(("name", "expected"), [
+    ("inertia", {"lines", "exact-lumped"}), ("inertia_failed", {"lines", "exact-lumped"}), ("grid", {"lines", "map"}),
+    ("orders", {"lines", "map", "convergence"}),
+])
+def test_every_picture_of_every_sweep_is_drawn(sweeps, tmp_path, monkeypatch, name, expected):
+    monkeypatch.setattr(style, "FORMATS", (".png",))
+    paths = figures.plot(sweeps[name], tmp_path / name)
+    assert {path.stem.removeprefix(f"{name}-") for path in paths} == expected
+
+
+def test_lines_split_by_the_other_axis(sweeps, tmp_path):
+    figure = sweep_lines.plot(sweeps["inertia"], tmp_path / "x.png", ["phi(2)"], "mass_ratio")
+    axes = figure.axes[0]
+    lines = labelled(axes)
+    ratio = np.array(result_files.RATIOS)
+    assert np.allclose(lines["distributed"], np.stack([ratio, -2 / ratio], axis=1))
+    assert np.allclose(lines["lumped"], np.stack([ratio, -2.2 / ratio], axis=1))
+    assert axes.get_xscale() == "log" and axes.get_xlabel() == "total node mass / total rod mass"
+    assert "[rad]" in axes.get_ylabel()
+
+
+@pytest.mark.parametrize("name", ["inertia", "inertia_failed"])
+def test_exact_and_lumped_stand_over_their_difference(sweeps, tmp_path, name):
+    figure = exact_lumped.plot(sweeps[name], tmp_path / "x.png", ["phi(4)", "rotation"])
+    top, bottom = figure.axes[0], figure.axes[2]
+    ratio = np.array(result_files.RATIOS)
+    lumped = -4.4 / ratio
+    if name == "inertia_failed":
+        lumped[1] = np.nan
+        assert crosses(top) == ([4.0], "failed: 1 of 10 cases")
+    assert np.allclose(labelled(top)["exact"][:, 1], -4 / ratio)
+    assert np.allclose(labelled(top)["lumped"][:, 1], lumped, equal_nan=True)
+    assert np.allclose(bottom.lines[0].get_ydata(), np.abs(-4 / ratio - lumped), equal_nan=True)
+    assert bottom.get_yscale() == "log"
+
+
+def test_a_sweep_without_both_kinds_of_inertia_is_told(sweeps, tmp_path):
+    with pytest.raises(DataError, match="no axis 'model.inertia'; it has chain.hinge_stiffness"):
+        exact_lumped.plot(sweeps["grid"], tmp_path / "x.png", ["phi(1)"])
+
+
+def test_a_map_has_its_cells_where_its_axes_say(sweeps, tmp_path):
+    figure = heat_map.plot(sweeps["grid"], tmp_path / "x.png", "phi(1)", ["mass_ratio", "chain.hinge_stiffness(0)"])
+    axes = figure.axes[0]
+    cells = axes.collections[0].get_array()
+    expected = np.log10(result_files.STIFFNESS)[:, None] * np.array(result_files.RATIOS)
+    failed = np.zeros(30, dtype=bool)
+    failed[[0, 7, 22]] = True
+    failed = failed.reshape(5, 6).T
+    assert np.array_equal(np.ma.getmaskarray(cells).reshape(6, 5), failed)
+    assert np.allclose(cells.reshape(6, 5)[~failed], expected[~failed])
+    assert crosses(axes) == ([0, 1, 3], "failed: 3 of 30 cases")
+    assert axes.get_ylabel() == "hinge stiffness $C_{0}$ [N m/rad]"
+    assert [t.get_text() for t in axes.get_xticklabels()] == ["2", "4", "8", "16", "32"]
+
+
+def test_fitted_orders_are_those_of_the_data(sweeps, tmp_path):
+    figure = convergence.plot(sweeps["orders"], tmp_path / "x.png", ["phi(1)"], reference=[0.25])
+    assert abs(figure.fits["phi(1)", "erk"].order - 2) < 1e-6
+    assert abs(figure.fits["phi(1)", "dop853"].order - 4) < 0.01
+    lines = labelled(figure.axes[0])
+    assert np.allclose(lines["dop853: order 4.00"][:, 1], 5 * np.sort(result_files.STEPS) ** 4, rtol=1e-3)
+    assert crosses(figure.axes[0]) == ([0.01], "failed: 1 of 10 cases")
+
+
+def test_the_finest_case_serves_as_reference(sweeps, tmp_path):
+    figure = convergence.plot(sweeps["orders"], tmp_path / "x.png", ["phi(1)"], where={"solver.method": "erk"})
+    (fit,) = figure.fits.values()
+    assert 1.9 < fit.order < 2.3 and fit.used.sum() == 3
+
+
+def test_points_at_the_floor_of_rounding_are_not_fitted():
+    h = 0.1 * 0.5 ** np.arange(8)
+    error = h**4 + np.where(h < 0.01, 2e-9, 0.0) * np.array([1, 1, 1, 1, 1, 1.3, 0.9, 1.2])
+    fit = convergence.fit_order(h, error, floor=1e-15)
+    assert abs(fit.order - 4) < 0.4 and fit.used.sum() == 5
+    assert convergence.fit_order(h[:1], error[:1], 0.0) is None
+
+
+def test_a_run_can_be_the_reference(runs, sweeps, tmp_path):
+    with pytest.raises(DataError, match="no row at t = 1 s"):
+        convergence.plot(sweeps["orders"], tmp_path / "x.png", ["phi(1)"], reference=runs["n4"])
+
+
+def test_what_a_sweep_lacks_is_said(runs, sweeps, tmp_path):
+    for arguments, words in [
+        ((["phi(9)"],), "no rod 9: the chains have rods 1 to 4"),
+        ((["phi"],), r"write phi\(1\) to phi\(4\)"),
+        ((["energy"],), "no data set 'energy'"),
+        ((["phi(1)"], "length"), "no axis 'length'; it has mass_ratio, model.inertia"),
+        ((["phi(1)"], "mass_ratio", {"mass_ratio": 3}), "no case with mass_ratio = 3; it has 2.0, 4.0"),
+        ((["phi(1)"], "mass_ratio", {}, 2.0), "no probe time 2 s; it has 1 s"),
+    ]:
+        with pytest.raises(DataError, match=words):
+            sweep_lines.plot(sweeps["inertia"], tmp_path / "x.png", *arguments)
+    with pytest.raises(DataError, match="is a run file; this script reads sweep files"):
+        sweep_lines.plot(runs["n1"], tmp_path / "x.png")
+    with pytest.raises(DataError, match="no case is done"):
+        figures.plot(sweeps["all_failed"], tmp_path / "x")
+
+
+def test_a_sweep_of_failures_only_still_shows_them(sweeps, tmp_path):
+    figure = sweep_lines.plot(sweeps["all_failed"], tmp_path / "x.png", ["phi(1)"])
+    assert crosses(figure.axes[0]) == ([1.0, 2.0, 3.0], "failed: 3 of 3 cases")
+
+
+def test_texts_of_any_kind_are_read(tmp_path):
+    for kind in ("S16", "S3", "vlen"):
+        path = result_files.write_sweep(tmp_path / f"{kind}.h5", {"solver.method": ["erk", "bdf"]}, np.ones((2, 1, 1)), text_type=kind)
+        with open_sweep(path) as sweep:
+            assert sweep.axis("solver.method").tolist() == ["erk", "bdf"]
+            assert sweep.status == ["done", "done"] and sweep.done.all()
+
+
+def test_a_directory_stands_for_its_sweep(tmp_path):
+    result_files.write_sweep(tmp_path / "sweep.h5", {"mass_ratio": [1.0, 2.0]}, np.ones((2, 1, 1)))
+    figure = sweep_lines.plot(tmp_path, tmp_path / "x.png")
+    assert figure.axes[0].lines[0].get_ydata().tolist() == [1.0, 1.0]
+
+
+def test_work_precision_pairs_errors_with_seconds(tmp_path):
+    path = result_files.write_benchmark(tmp_path / "bench.h5")
+    figure = work_precision.plot(path, tmp_path / "x.png")
+    visible = [axes for axes in figure.axes if axes.get_visible()]
+    assert len(visible) == 3  # beam: one error; table1: two
+    table1 = next(axes for axes in visible if axes.get_title(loc="left") == "Scene table1")
+    assert labelled(table1)["dop853"].tolist() == [[1e-12, 1.1], [1e-9, 0.7], [1e-5, 0.5]]
+    assert labelled(table1)["adams"].tolist() == [[1e-7, 2.0], [1e-3, 1.0]]
+    assert "failed: 1 of 6 runs" in labelled(table1)
+    with pytest.raises(DataError, match="no scene 'x'; it has beam, table1"):
+        work_precision.plot(path, tmp_path / "x.png", ["x"])
+    with pytest.raises(DataError, match="is no benchmark file"):
+        work_precision.plot(result_files.write_sweep(tmp_path / "s.h5", {}, np.ones((1, 1, 1))), tmp_path / "x.png")
