@@ -20,7 +20,7 @@ import style
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from rodyn_data import DataError, Sweep, distinct, open_run, open_sweep
-from sweep_lines import mark_failed, probe_text, where_text
+from sweep_lines import heading, mark_failed
 
 COUNTS = ("case.n_outputs", "chain.n_rods", "model.gauss_points")  # finer when larger
 DEFAULT_AXES = ("solver.fixed_step", "solver.rtol", *COUNTS)
@@ -77,23 +77,29 @@ def references(sweep: Sweep, names: Sequence[str], reference, time: float | None
 
 
 def fit_order(x: np.ndarray, error: np.ndarray, floor: float) -> Fit | None:
-    """Least squares in logarithms over the finest points that still converge and lie above the floor of rounding.
+    """Least squares in logarithms over the finest points above the floor, or above the plateau where errors end.
 
     x falls towards finer cases.
     """
     order = np.argsort(-x)
-    good = [i for i in order if np.isfinite(error[i]) and error[i] > floor]
-    local = np.diff(np.log(error[good])) / np.diff(np.log(x[good])) if len(good) > 1 else np.array([])
-    last = 0
-    while last < local.size and local[last] > 0.5 * np.median(local[: last + 1]) > 0:
-        last += 1
-    chosen = good[: last + 1][-MOST_FITTED:]
-    if len(chosen) < 2:
+    good = np.array([i for i in order if np.isfinite(error[i]) and error[i] > floor], dtype=int)
+    above = error[good] > 3.0 * plateau(np.log(x[good]), error[good])
+    chosen = good[above][-MOST_FITTED:]
+    if chosen.size < 2:
         return None
     slope, constant = np.polyfit(np.log(x[chosen]), np.log(error[chosen]), 1)
     used = np.zeros(x.size, dtype=bool)
     used[chosen] = True
     return Fit(float(slope), float(np.exp(constant)), used)
+
+
+def plateau(log_x: np.ndarray, error: np.ndarray) -> float:
+    """The largest error of the longest tail of fine cases that does not converge any more; 0 if all do."""
+    for start in range(error.size - 1):
+        tail = error[start:]
+        if tail.max() < 10.0 * tail.min() and np.polyfit(log_x[start:], np.log(tail), 1)[0] < 0.3:
+            return float(tail.max())
+    return 0.0
 
 
 def draw(sweep: Sweep, names: Sequence[str], axis: str, known: Sequence[float | None], where: Mapping[str, Any],
@@ -103,7 +109,8 @@ def draw(sweep: Sweep, names: Sequence[str], axis: str, known: Sequence[float | 
     columns = min(2, len(names))
     rows = -(-len(names) // columns)
     figure, grid = style.new_figure(rows, columns, height=0.9 + 2.9 * rows)
-    figure.suptitle(style.shorten(f"Convergence: {sweep.title}, {probe_text(sweep, time)}{where_text(where)}", 90))
+    than = "finest case of each line" if known[0] is None else "reference"
+    figure.suptitle(f"Convergence: {heading(sweep, time, where, 44)}; error against the {than}")
     figure.fits = {}
     for axes, name, value in zip(grid.flat, names, known, strict=False):
         figure.fits.update(draw_panel(axes, sweep, name, axis, value, where, time))
@@ -125,6 +132,7 @@ def draw_panel(axes: Axes, sweep: Sweep, name: str, axis: str, exact: float | No
         failed.extend(x[sweep.failed[series.cases]])
         done = np.flatnonzero(np.isfinite(values))
         if not done.size:
+            fits[name, series.label] = None
             continue
         finest = done[np.argmin(fineness[done])]
         best = values[finest] if exact is None else exact
@@ -135,9 +143,16 @@ def draw_panel(axes: Axes, sweep: Sweep, name: str, axis: str, exact: float | No
         draw_line(axes, i, x, error, fit, series.label, rising)
     mark_failed(axes, failed, int(sweep.chosen(where).sum()))
     quantity = sweep.quantity(name, time)
-    than = "finest case" if exact is None else "reference"
     axes.set(xlabel=sweep.axis_label(axis), ylabel=f"|error of {quantity.symbol}| [{quantity.unit}]")
-    axes.set_title(f"{quantity.meaning} against the {than}", loc="left")
+    axes.set_title(quantity.meaning, loc="left")
+    if not any(np.isfinite(line.get_ydata()).any() for line in axes.lines if line.get_marker() != "x"):
+        style.note(axes, "no case differs from the reference")
+        axes.set_yticks([])
+    numbers = np.unique(sweep.axis(axis)[sweep.chosen(where)])
+    if numbers.size > 1:
+        axes.set_xlim(numbers[0] / 1.2, numbers[-1] * 1.2)
+    style.log_labels(axes.xaxis)
+    style.log_labels(axes.yaxis)
     if axes.get_legend_handles_labels()[1]:
         style.legend_above(axes, ncols=1 if len(fits) < 4 else 2)
     return fits

@@ -17,7 +17,7 @@ import style
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from rodyn_data import DataError, Quantity, Sweep, open_sweep, text_of
-from sweep_lines import Places, default_axis, mark_failed, probe_text, where_text
+from sweep_lines import Places, default_axis, heading, mark_failed
 
 INERTIA = "model.inertia"
 KINDS = ("distributed", "lumped")
@@ -77,25 +77,28 @@ def pair_up(sweep: Sweep, name: str, axis: str | None, where: Mapping[str, Any],
 
 
 def draw(sweep: Sweep, names: Sequence[str], axis: str | None, where: Mapping[str, Any], time: float | None) -> Figure:
-    n = len(names)
-    figure, grid = style.new_figure(2, n, width=max(style.WIDTH * 0.6, 2.35 * n), height=4.9, sharex="col")
-    figure.suptitle(style.shorten(f"{sweep.title}: exact and lumped inertia, {probe_text(sweep, time)}{where_text(where)}", 34 * max(2, n)))
+    columns = min(2, len(names))
+    rows = -(-len(names) // columns)
+    figure, grid = style.new_figure(2 * rows, columns, width=style.WIDTH * (1.0 if columns > 1 else 0.6), height=0.8 + 3.6 * rows)
+    figure.suptitle(f"Exact and lumped inertia: {heading(sweep, time, where, 24 * columns)}")
     total = int(sweep.chosen(where).sum())
     for i, name in enumerate(names):
         axis, pair = pair_up(sweep, name, axis, where, time)
-        top, bottom = grid[:, i]
+        top, bottom = grid[2 * (i // columns):, i % columns][:2]
         places = Places(top, sweep, axis)
         Places(bottom, sweep, axis)
         x = places.of(pair.x)
-        top.plot(x, pair.exact.values, label="exact", **style.mark_style(0))
-        top.plot(x, pair.lumped.values, label="lumped", **style.mark_style(2))
+        top.plot(x, pair.exact.values, label="exact", **style.mark_style(0, x.size))
+        top.plot(x, pair.lumped.values, label="lumped", **style.mark_style(2, x.size))
         failed = places.of(np.array(pair.failed)) if pair.failed else []
         mark_failed(top, failed, total)
         top.set(ylabel=pair.exact.label)
-        top.set_title(pair.exact.meaning.replace("along the moving ", "").replace(" of the spacecraft", ""), loc="left")
+        top.set_title(pair.exact.meaning, loc="left")
         draw_difference(bottom, x, pair, failed)
         bottom.set(xlabel=sweep.axis_label(axis))
-    style.legend_below(figure, grid[0])
+    for axes in grid[:, -1][2 * (len(names) // columns):]:
+        axes.set_visible(False)
+    style.legend_below(figure, grid.flat)
     return figure
 
 
@@ -107,8 +110,10 @@ def draw_difference(axes: Axes, x: np.ndarray, pair: Pair, failed: Sequence[floa
     if np.all(np.isnan(size)):
         style.note(axes, "no difference")
         return
-    axes.semilogy(x, size, **style.mark_style(1))
+    axes.semilogy(x, size, **style.mark_style(1, x.size))
     mark_failed(axes, failed, 0)
+    axes.lines[-1].set_label("_nolegend_" if len(failed) else "|exact − lumped|")
+    style.log_labels(axes.yaxis)
 
 
 def main() -> int:

@@ -17,7 +17,7 @@ import style
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from rodyn_data import DataError, Sweep, distinct, open_sweep
-from sweep_lines import default_quantities, probe_text, where_text
+from sweep_lines import default_quantities, heading
 
 
 def plot(file: str | pathlib.Path, out: str | pathlib.Path, quantity: str | None = None, axes: Sequence[str] = (),
@@ -49,7 +49,8 @@ def draw(sweep: Sweep, name: str, names: Sequence[str], where: Mapping[str, Any]
 
     figure, grid = style.new_figure(width=0.85 * style.WIDTH, height=4.2)
     axes = grid[0, 0]
-    figure.suptitle(style.shorten(f"{sweep.title}: {quantity.meaning}, {probe_text(sweep, time)}{where_text(where)}", 80))
+    meaning = quantity.meaning[:1].upper() + quantity.meaning[1:]
+    figure.suptitle(f"{meaning}: {heading(sweep, time, where, 40)}")
     axes.grid(False)
     signed = np.nanmin(picture, initial=0.0) < 0 < np.nanmax(picture, initial=0.0)
     mesh = axes.pcolormesh(np.arange(len(values[0]) + 1) - 0.5, np.arange(len(values[1]) + 1) - 0.5, np.ma.masked_invalid(picture),
@@ -68,7 +69,7 @@ def ticks(axis, values: Sequence[Any]) -> None:
     """At most ten labels at the middle of their cells."""
     every = max(1, -(-len(values) // 10))
     shown = list(range(0, len(values), every))
-    axis.set_ticks(shown, [values[i] if isinstance(values[i], str) else f"{values[i]:.4g}" for i in shown])
+    axis.set_ticks(shown, [values[i] if isinstance(values[i], str) else style.number_text(values[i]) for i in shown])
 
 
 def cross_out(axes: Axes, column: np.ndarray, row: np.ndarray, total: int) -> None:

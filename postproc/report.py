@@ -182,7 +182,7 @@ def grid(caption: str, head: Sequence[str], rows: Sequence[Sequence[str]], numbe
 
 def inputs(attributes: dict[str, Any]) -> list[str]:
     """Every text that looks like a namelist, whatever its name: input, resolved input, the base of a sweep."""
-    found = [(name, text) for name, text in attributes.items() if isinstance(text, str) and "input" in name or name in ("base", "sweep")]
+    found = [(name, text) for name, text in attributes.items() if isinstance(text, str) and ("input" in name or "base" in name)]
     parts = ["<h2>Input</h2>"] if found else []
     for name, text in sorted(found):
         opened = " open" if name == "input" else ""

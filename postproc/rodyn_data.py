@@ -72,6 +72,8 @@ RATE_OF = {
     "phi": "phi_rate", "alpha": "alpha_rate", "beta": "beta_rate",
     "displacement_x": "velocity_x", "displacement_y": "velocity_y", "rotation": "omega",
 }
+FINAL = "final_"  # states at the end of each case of a sweep
+FINAL_PER_ROD = [FINAL + name for name in ROD_SYMBOLS]
 # Axes of sweeps and columns of sweep files: symbol or words, unit.
 PARAMETERS = {
     "mass_ratio": ("total node mass / total rod mass", ""),
@@ -286,25 +288,29 @@ class Sweep:
     def quantity(self, text: str, t: float | None = None) -> Quantity:
         """A state at a probe time, 'phi(4)', or a number of each case, 'n_rhs'; NaN where a case has none."""
         name, rod = split_name(text)
-        if name not in self.file or name.startswith("param_"):
+        if name not in self.file or self.file[name].dtype.kind not in "fiu":
             known = ", ".join(n for n in self.file if n in SYMBOLS or n in PARAMETERS)
             raise DataError(f"{self.path}: no data set '{name}'; it has {known}")
         data = self.file[name]
-        if data.ndim == 3 and rod is None:
-            raise DataError(f"{self.path}: '{name}' has one column per rod: write {name}(1) to {name}({data.shape[2]})")
-        if data.ndim < 3 and rod is not None:
+        per_rod = data.ndim == 3 or name in FINAL_PER_ROD
+        if per_rod and rod is None:
+            raise DataError(f"{self.path}: '{name}' has one column per rod: write {name}(1) to {name}({data.shape[-1]})")
+        if not per_rod and rod is not None:
             raise DataError(f"{self.path}: '{name}' does not belong to a rod: write {name}")
-        if rod is not None and not 1 <= rod <= data.shape[2]:
-            raise DataError(f"{self.path}: no rod {rod}: the chains have rods 1 to {data.shape[2]}")
+        if rod is not None and not 1 <= rod <= data.shape[-1]:
+            raise DataError(f"{self.path}: no rod {rod}: the chains have rods 1 to {data.shape[-1]}")
         if data.ndim == 1:
             values = data[()].astype(float)
+        elif data.ndim == 2:
+            values = data[:, self.probe(t) if rod is None else rod - 1]
         else:
-            values = data[:, self.probe(t)] if rod is None else data[:, self.probe(t), rod - 1]
+            values = data[:, self.probe(t), rod - 1]
         values = np.where(self.done, values, np.nan)
-        words, unit = PARAMETERS.get(name, (symbol_text(name, rod), UNITS.get(name, "")))
+        state = name.removeprefix(FINAL)
+        words, unit = PARAMETERS.get(name, (symbol_text(state, rod), UNITS.get(state, "")))
         unit = text_of(data.attrs.get("units", unit))
         unit = "" if unit in ("1", "none") else unit
-        meaning = MEANINGS.get(name, words) + ("" if rod is None else f" of rod {rod}")
+        meaning = MEANINGS.get(state, words) + ("" if rod is None else f" of rod {rod}") + (" at the end" if state != name else "")
         return Quantity(text.replace(" ", ""), values, words, unit_text(unit), meaning)
 
     def axis_label(self, name: str) -> str:
@@ -337,11 +343,21 @@ class Sweep:
     def split(self, axes: Sequence[str], where: Mapping[str, str | float]) -> tuple[list[str], dict[tuple, list[int]]]:
         """The other axes that change among the chosen cases, and the cases by their values on them."""
         keep = self.chosen(where)
-        others = [a for a in self.axes if a not in axes and a not in where and len(distinct(self.axes[a][keep])) > 1]
+        others = [a for a in self.axes if a not in axes and a not in where and not self._follows(a, axes, keep)]
         groups: dict[tuple, list[int]] = {}
         for case in np.flatnonzero(keep):
             groups.setdefault(tuple(text_of(self.axes[a][case]) for a in others), []).append(int(case))
         return others, groups
+
+    def _follows(self, name: str, axes: Sequence[str], keep: np.ndarray) -> bool:
+        """True if the axis is constant, or a function of `axes`, such as a tolerance that goes along with another."""
+        known: dict[tuple, Any] = {}
+        for case in np.flatnonzero(keep):
+            key = tuple(text_of(self.axes[a][case]) for a in axes)
+            value = text_of(self.axes[name][case])
+            if known.setdefault(key, value) != value:
+                return False
+        return True
 
     def series(self, text: str, axes: Sequence[str], where: Mapping[str, str | float], t: float | None) -> list[Series]:
         """One line for each set of values on the axes that are not in `axes`."""
@@ -363,7 +379,7 @@ class Series(NamedTuple):
     @property
     def label(self) -> str:
         return ", ".join(
-            value if isinstance(value, str) else f"{name.rpartition('.')[2]} = {value:g}" for name, value in self.where.items()
+            value if isinstance(value, str) else f"{name.rpartition('.')[2]} = {value:.4g}" for name, value in self.where.items()
         )
 
 

@@ -14,7 +14,9 @@ import matplotlib
 import numpy as np
 from cycler import cycler
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
 
 COLOURS = ["#000000", "#0072B2", "#D55E00", "#009E73", "#E69F00", "#56B4E9", "#CC79A7"]
 DASHES: list[Any] = ["-", (0, (5, 1.6)), (0, (6, 1.5, 1.2, 1.5)), (0, (1.4, 1.2)), (0, (9, 2)), (0, (3, 1.2, 1, 1.2, 1, 1.2)), (0, (2.5, 2.5))]
@@ -68,8 +70,10 @@ def line_style(i: int) -> dict[str, Any]:
     return {"color": COLOURS[i % len(COLOURS)], "linestyle": DASHES[(i + i // len(COLOURS)) % len(DASHES)]}
 
 
-def mark_style(i: int) -> dict[str, Any]:
-    return line_style(i) | {"marker": MARKERS[i % len(MARKERS)]}
+def mark_style(i: int, points: int = 1) -> dict[str, Any]:
+    """Line style and marks, smaller ones on a line of many points."""
+    size = 4.5 if points <= 16 else 2.6 if points <= 80 else 0.0
+    return line_style(i) | {"marker": MARKERS[i % len(MARKERS)] if size else "", "markersize": size}
 
 
 def sequence_colours(n: int) -> list[Any]:
@@ -84,6 +88,33 @@ def legend_above(axes: Axes, **options: Any) -> None:
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.15, borderpad=0.15, columnspacing=1.4, **options)
     rows = -(-len(axes.get_legend_handles_labels()[1]) // options["ncols"])
     axes.set_title(axes.get_title(loc="left"), loc="left", pad=5 + 12.5 * rows)
+
+
+def number_text(value: float) -> str:
+    """At most four digits, without an exponent below a million."""
+    text = f"{value:.4g}"
+    return f"{value:.0f}" if "e+" in text and abs(value) < 1e6 else text
+
+
+def log_labels(axis: Axis) -> None:
+    """Labels at decades; at 2 and 5 too where less than two decades are seen. Call it when the limits are known."""
+    low, high = axis.get_view_interval()
+    decades = abs(np.log10(high / low))
+    if decades < 1.7:
+        axis.set_major_formatter(FuncFormatter(lambda v, _: power_text(v)))
+    axis.set_minor_formatter(FuncFormatter(lambda v, _: power_text(v) if decades < 1.7 and mantissa(v) in (2, 5) else ""))
+
+
+def mantissa(value: float) -> int:
+    return round(value / 10 ** np.floor(np.log10(value) + 1e-9))
+
+
+def power_text(value: float) -> str:
+    exponent = int(np.floor(np.log10(value) + 1e-9))
+    if -2 <= exponent <= 3:
+        return f"{value:.4g}"
+    factor = "" if mantissa(value) == 1 else rf"{mantissa(value)}\cdot"
+    return rf"${factor}10^{{{exponent}}}$"
 
 
 def legend_below(figure: Figure, panels: Iterable[Axes]) -> None:

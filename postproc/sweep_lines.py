@@ -43,7 +43,7 @@ def default_axis(sweep: Sweep) -> str:
     numbers = [name for name, values in sweep.axes.items() if values.dtype.kind in "fiu"]
     if not sweep.axes:
         raise DataError(f"{sweep.path}: the sweep has no axes")
-    return max(numbers or sweep.axes, key=lambda name: len(distinct(sweep.axes[name])))
+    return max(numbers or sweep.axes, key=lambda name: (len(distinct(sweep.axes[name])), name != "solver.atol"))
 
 
 def count(sweep: Sweep, axis: str) -> int:
@@ -55,7 +55,7 @@ def draw(sweep: Sweep, quantities: Sequence[str], axis: str, where: Mapping[str,
     columns = min(2, len(quantities))
     rows = -(-len(quantities) // columns)
     figure, grid = style.new_figure(rows, columns, height=0.9 + 2.5 * rows)
-    figure.suptitle(style.shorten(f"{sweep.title}: {probe_text(sweep, time)}{where_text(where)}", 90))
+    figure.suptitle(heading(sweep, time, where))
     for axes, name in zip(grid.flat, quantities, strict=False):
         draw_panel(axes, sweep, name, axis, where, time)
     for axes in grid.flat[len(quantities):]:
@@ -74,9 +74,7 @@ def draw_panel(axes: Axes, sweep: Sweep, name: str, axis: str, where: Mapping[st
     for i, series in enumerate(found):
         x = place.of(sweep.axis(axis)[series.cases])
         order = np.argsort(x, kind="stable")
-        many = x.size > 60
-        axes.plot(x[order], series.quantity.values[order], label=series.label or None,
-                  **(style.line_style(i) if many else style.mark_style(i)))
+        axes.plot(x[order], series.quantity.values[order], label=series.label or None, **style.mark_style(i, x.size))
         failed.extend(x[sweep.failed[series.cases]])
     mark_failed(axes, failed, int(sweep.chosen(where).sum()))
     quantity = found[0].quantity
@@ -99,7 +97,7 @@ class Places:
         if is_logarithmic(numbers):
             axes.set_xscale("log", base=2 if is_powers_of_two(numbers) else 10)
             if numbers.size <= 8:
-                axes.set_xticks(numbers, [f"{v:g}" for v in numbers])
+                axes.set_xticks(numbers, [style.number_text(v) for v in numbers])
                 axes.minorticks_off()
 
     def of(self, values: np.ndarray) -> np.ndarray:
@@ -130,6 +128,12 @@ def mark_failed(axes: Axes, x: Sequence[float], total: int) -> None:
 def probe_text(sweep: Sweep, time: float | None) -> str:
     t = sweep.probe_times[sweep.probe(time)]
     return "" if np.isnan(t) else f"t = {t:g} s"
+
+
+def heading(sweep: Sweep, time: float | None, where: Mapping[str, Any], width: int = 60) -> str:
+    """Title of the sweep, probe time, fixed axes."""
+    parts = [style.shorten(sweep.title, width), probe_text(sweep, time)]
+    return ", ".join(part for part in parts if part) + where_text(where)
 
 
 def where_text(where: Mapping[str, Any]) -> str:

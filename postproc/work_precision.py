@@ -42,6 +42,7 @@ def draw(scenes: Sequence[BenchmarkScene]) -> Figure:
                 continue
             label, error = list(scene.errors.values())[i]
             draw_panel(axes, scene, label, error, methods)
+    style.legend_below(figure, grid.flat)
     return figure
 
 
@@ -57,9 +58,9 @@ def draw_panel(axes: Axes, scene: BenchmarkScene, label: str, error: np.ndarray,
     lost = failed & np.isfinite(scene.seconds)
     if failed.any():
         axes.plot(np.full(lost.sum(), 0.98), scene.seconds[lost], transform=axes.get_yaxis_transform(), linestyle="none", marker="x",
-                  markersize=7, markeredgewidth=1.8, color=style.FAILED, label=f"failed: {failed.sum()} of {failed.size} runs")
+                  markersize=7, markeredgewidth=1.8, color=style.FAILED, label="failed, or without error")
     axes.invert_xaxis()
-    style.legend_above(axes, ncols=3)
+    style.log_labels(axes.yaxis)
 
 
 def main() -> int:

@@ -71,6 +71,8 @@ def write_sweep(path: pathlib.Path, axes: dict[str, list], phi: np.ndarray, fail
             file[name].attrs["units"] = np.bytes_("rad s-1" if name.endswith("rate") else "rad")
         for factor, name in enumerate(("velocity_x", "velocity_y", "omega", "displacement_x", "displacement_y", "rotation")):
             file[name] = np.where(bad[:, None], np.nan, phi[:, :, 0] + factor)
+        file["final_phi"] = phi[:, -1] + 100.0
+        file["final_rotation"] = phi[:, -1, 0] + 100.0
         for key, values in axes.items():
             column = np.array(values)
             if column.dtype.kind == "U":
