@@ -352,8 +352,9 @@ class Sweep:
     def _follows(self, name: str, axes: Sequence[str], keep: np.ndarray) -> bool:
         """True if the axis is constant, or a function of `axes`, such as a tolerance that goes along with another."""
         known: dict[tuple, Any] = {}
+        fixed = [self.axis(a) for a in axes]
         for case in np.flatnonzero(keep):
-            key = tuple(text_of(self.axes[a][case]) for a in axes)
+            key = tuple(text_of(values[case]) for values in fixed)
             value = text_of(self.axes[name][case])
             if known.setdefault(key, value) != value:
                 return False
