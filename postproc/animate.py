@@ -60,10 +60,10 @@ def record(run: Run, out: pathlib.Path, magnification: float, frame: str, frames
             draw_shape(axes, shape, style.COLOURS[1], radii)
             axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal", **axis_names(frame))
             axes.set_title(f"{title}\nt = {shape.time:.{digits}f} s, {frame} frame, {bending}", loc="left")
+            if i == 0:
+                style.settle(figure)  # the frames must not jump
             writer.grab_frame()
             figure.times.append(shape.time)
-            if i == 0:
-                figure.set_layout_engine("none")  # the frames must not jump
     return figure
 
 

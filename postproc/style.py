@@ -126,17 +126,22 @@ def legend_below(figure: Figure, panels: Iterable[Axes]) -> None:
         figure.legend(found.values(), found.keys(), loc="outside lower center", ncols=columns)
 
 
+def settle(figure: Figure) -> None:
+    """Find the layout once for all formats. Axes of equal scale move when they are drawn, hence the second pass."""
+    for _ in range(2):
+        figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+
+
 def save(figure: Figure, out: str | pathlib.Path) -> list[pathlib.Path]:
     """Save as `out`; without one of the known suffixes as vector PDF and as PNG. The paths are kept as figure.saved."""
     out = pathlib.Path(out)
     known = (".pdf", ".png", ".svg")
     paths = [out] if out.suffix in known else [out.with_name(out.name + suffix) for suffix in FORMATS]
+    settle(figure)
     for path in paths:
         path.parent.mkdir(parents=True, exist_ok=True)
         # No time of creation, so that the same picture gives the same file.
-        # The layout found for the first format serves the others.
-        if path is not paths[0]:
-            figure.set_layout_engine("none")
         figure.savefig(path, metadata={".png": {"Software": None}, ".pdf": {"CreationDate": None}, ".svg": {"Date": None}}[path.suffix])
     figure.saved = paths
     return paths
