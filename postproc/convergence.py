@@ -24,7 +24,7 @@ from sweep_lines import heading, mark_failed
 
 COUNTS = ("case.n_outputs", "chain.n_rods", "model.gauss_points")  # finer when larger
 DEFAULT_AXES = ("solver.fixed_step", "solver.rtol", *COUNTS)
-MOST_FITTED = 5
+FEWEST_FITTED, MOST_FITTED = 3, 5
 
 
 class Fit(NamedTuple):
@@ -85,7 +85,7 @@ def fit_order(x: np.ndarray, error: np.ndarray, floor: float) -> Fit | None:
     good = np.array([i for i in order if np.isfinite(error[i]) and error[i] > floor], dtype=int)
     above = error[good] > 3.0 * plateau(np.log(x[good]), error[good])
     chosen = good[above][-MOST_FITTED:]
-    if chosen.size < 2:
+    if chosen.size < FEWEST_FITTED:
         return None
     slope, constant = np.polyfit(np.log(x[chosen]), np.log(error[chosen]), 1)
     used = np.zeros(x.size, dtype=bool)
@@ -148,6 +148,7 @@ def draw_panel(axes: Axes, sweep: Sweep, name: str, axis: str, exact: float | No
     if not any(np.isfinite(line.get_ydata()).any() for line in axes.lines if line.get_marker() != "x"):
         style.note(axes, "no case differs from the reference")
         axes.set_yticks([])
+        axes.set_yticks([], minor=True)
     numbers = np.unique(sweep.axis(axis)[sweep.chosen(where)])
     if numbers.size > 1:
         axes.set_xlim(numbers[0] / 1.2, numbers[-1] * 1.2)
