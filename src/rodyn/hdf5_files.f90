@@ -17,7 +17,8 @@ module rodyn_hdf5_files
       h5gcreate_f, h5gclose_f, h5gget_info_by_name_f, h5lexists_f, h5lget_name_by_idx_f, h5_index_name_f, h5_iter_inc_f, &
       h5screate_f, h5screate_simple_f, h5sclose_f, h5s_scalar_f, h5s_unlimited_f, h5s_select_set_f, &
       h5sselect_hyperslab_f, h5sget_simple_extent_ndims_f, h5sget_simple_extent_dims_f, &
-      h5tcopy_f, h5tclose_f, h5tset_size_f, h5tset_strpad_f, h5tset_cset_f, h5tget_size_f, h5tget_class_f, h5t_string_f, h5tis_variable_str_f, &
+      h5tcopy_f, h5tclose_f, h5tset_size_f, h5tset_strpad_f, h5tset_cset_f, h5tget_size_f, h5tget_class_f, h5t_string_f, &
+      h5tis_variable_str_f, &
       h5t_str_nullpad_f, h5t_cset_utf8_f, h5t_fortran_s1, h5t_ieee_f64le, h5t_std_i32le, h5t_std_i64le, &
       h5t_native_double, h5t_string, h5kind_to_type, h5_integer_kind, &
       h5dcreate_f, h5dopen_f, h5dclose_f, h5dwrite_f, h5dread_f, h5dset_extent_f, h5dget_space_f, &
