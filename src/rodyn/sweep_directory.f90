@@ -107,15 +107,13 @@ contains
    end subroutine lock_cases
 
    !> Ranks other than the first have locks of their own, so that a survivor of a killed job is noticed.
-   subroutine lock_rank(self, path, rank, fingerprint, error)
-      class(sweep_directory), intent(out) :: self
+   subroutine lock_rank(self, path, rank, error)
+      class(sweep_directory), intent(inout) :: self
       character(len=*), intent(in) :: path
       integer, intent(in) :: rank !! 1, 2, ...
-      integer(i8), intent(in) :: fingerprint
       type(error_type), allocatable, intent(out) :: error
 
       self%path = path
-      self%fingerprint = fingerprint
       call open_lock(self%lock, path//'/lock', error)
       if (allocated(error)) return
       if (.not. take_lock(self%lock, first_rank + rank, 1_i8, wait=.false.)) &

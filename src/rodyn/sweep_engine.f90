@@ -203,7 +203,7 @@ contains
       if (engine%ranks%rank > 0) then
          write (number, '(a, i6.6)') 'r', engine%ranks%rank
          engine%tag = trim(number)
-         call engine%directory%lock_rank(path, engine%ranks%rank, engine%directory%fingerprint, error)
+         call engine%directory%lock_rank(path, engine%ranks%rank, error)
          index%directory = path
       end if
       engine%next_number = index%next_number(engine%tag)

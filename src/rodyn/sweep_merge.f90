@@ -288,6 +288,8 @@ contains
       type(case_block), intent(in) :: block
       type(case_shape), intent(in) :: shape
       type(error_type), allocatable, intent(out) :: error
+      character(len=:), allocatable :: name
+      real(wp), allocatable :: part_2(:, :), part_3(:, :, :) ! contiguous copies
       integer :: i, first, last
 
       associate (n => block%n, rods => shape%n_rods)
@@ -302,34 +304,28 @@ contains
          do i = 1, size(per_rod)
             first = (i - 1)*rods + 1
             last = i*rods
-            associate (name => trim(run_variables(per_rod(i))%name))
-               if (.not. allocated(error)) call append_4(file, name, block%probes(first:last, :, :n), error)
-               if (.not. allocated(error)) call file%append('final_'//name, block%final(first:last, :n), error)
-               if (.not. allocated(error) .and. shape%n_rows > 0) &
-                  call append_4(file, 'series_'//name, block%series(first:last, :, :n), error)
-            end associate
+            name = trim(run_variables(per_rod(i))%name)
+            part_3 = block%probes(first:last, :, :n)
+            if (.not. allocated(error)) call file%append(name, part_3, error)
+            part_2 = block%final(first:last, :n)
+            if (.not. allocated(error)) call file%append('final_'//name, part_2, error)
+            if (shape%n_rows == 0) cycle
+            part_3 = block%series(first:last, :, :n)
+            if (.not. allocated(error)) call file%append('series_'//name, part_3, error)
          end do
          do i = 1, size(scalars)
             first = 6*rods + i
-            associate (name => trim(run_variables(scalars(i))%name))
-               if (.not. allocated(error)) call file%append(name, block%probes(first, :, :n), error)
-               if (.not. allocated(error)) call file%append('final_'//name, block%final(first, :n), error)
-               if (.not. allocated(error) .and. shape%n_rows > 0) &
-                  call file%append('series_'//name, block%series(first, :, :n), error)
-            end associate
+            name = trim(run_variables(scalars(i))%name)
+            part_2 = block%probes(first, :, :n)
+            if (.not. allocated(error)) call file%append(name, part_2, error)
+            if (.not. allocated(error)) call file%append('final_'//name, [block%final(first, :n)], error)
+            if (shape%n_rows == 0) cycle
+            part_2 = block%series(first, :, :n)
+            if (.not. allocated(error)) call file%append('series_'//name, part_2, error)
          end do
          if (.not. allocated(error) .and. shape%n_rows > 0) call file%append('series_time', block%times(:, :n), error)
       end associate
    end subroutine append_block
-
-   !> A part of the states, as an array of its own.
-   subroutine append_4(file, name, part, error)
-      type(hdf5_file), intent(in) :: file
-      character(len=*), intent(in) :: name
-      real(wp), intent(in) :: part(:, :, :)
-      type(error_type), allocatable, intent(out) :: error
-      call file%append(name, part, error)
-   end subroutine append_4
 
    !> The values of the axes in cases first, first + 1, ...
    subroutine append_parameters(file, sweep, plan, first, n, error)
