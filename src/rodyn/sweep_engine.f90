@@ -7,6 +7,7 @@ module rodyn_sweep_engine
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type, raise, exit_bad_input, exit_done, exit_failed, exit_stopped
    use rodyn_file_text, only: read_text_file
+   use rodyn_lapack, only: use_one_thread
    use rodyn_posix, only: ignore_file_size_signal, path_exists, rename_over
    use rodyn_posix_files, only: stop_signal, watch_signals, write_text_file
    use rodyn_sweep_case, only: case_result, case_shape, new_case_shape, pulse_type, run_sweep_case, status_done, &
@@ -72,6 +73,7 @@ contains
       type(engine_type), target :: engine
 
       engine%options = options
+      call use_one_thread()
       call engine%ranks%start()
       call sweep_in_order(engine, exit_code, error)
       if (allocated(error)) exit_code = error%exit_code
