@@ -204,7 +204,7 @@ contains
             axis%numbers = spaced(first, last, n, spacing == 'log')
          end if
       end if
-      if (given('spacing') .and. .not. by_range) &
+      if (spacing == 'log' .and. .not. by_range) &
          call blame(checked, 'axis', i, 'spacing', 'goes with start, stop and count only')
 
    contains
