@@ -39,7 +39,7 @@ module rodyn_posix_files
    end type flock_record
 
    !> The signal that came; 0: none.
-   integer(c_int), volatile, save :: caught = 0
+   integer(c_int), volatile :: caught = 0
 
    interface
       function posix_creat(path, mode) result(descriptor) bind(c, name='creat')

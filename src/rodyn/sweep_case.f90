@@ -110,6 +110,7 @@ contains
          case ('case.n_outputs')
             n_outputs = nint(maxval(sweep%axes(a)%numbers))
             shape%outputs = .true.
+         case default ! changes no size
          end select
       end do
       shape%n_states = 6*shape%n_rods + 6

@@ -327,8 +327,8 @@ contains
             if (kept%status == status_done) engine%mine_done = engine%mine_done + 1
             if (kept%status == status_failed) engine%mine_failed = engine%mine_failed + 1
          end do
-         if (first + chunk >= n) exit
-         if (engine%ranks%add(at_errors, 0) > 0) exit
+         if (first + chunk >= n) exit hand_out
+         if (engine%ranks%add(at_errors, 0) > 0) exit hand_out
       end do hand_out
       if (.not. allocated(error)) call engine%writer%seal(error)
       if (len(stop_signal()) > 0 .and. engine%ranks%add(at_next, 0) < n) ignored = engine%ranks%add(at_next, n)

@@ -100,6 +100,7 @@ contains
             call push(names, n_sealed, name)
          case ('combined', 'aside', 'gone')
             call push(away, n_away, name)
+         case default ! says nothing of a shard
          end select
       end subroutine take
 
