@@ -18,6 +18,7 @@ program tester
    use test_quadrature, only: collect_quadrature
    use test_run_file, only: collect_run_file
    use test_schema, only: collect_schema
+   use test_sweep, only: collect_sweep
    implicit none (type, external)
 
    abstract interface
@@ -43,6 +44,7 @@ program tester
    call run('namelist_faults', collect_namelist_faults)
    call run('namelist_fuzz', collect_namelist_fuzz)
    call run('schema', collect_schema)
+   call run('sweep', collect_sweep)
    call run('case_keys', collect_case_keys)
    call run('case_rules', collect_case_rules)
    call run('case_reader', collect_case_reader)

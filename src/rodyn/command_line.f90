@@ -4,8 +4,12 @@ module rodyn_command_line
    use rodyn_errors, only: error_type, raise, exit_done, exit_bad_input
    use rodyn_case_config, only: case_config
    use rodyn_case_reader, only: read_case, default_case
+   use rodyn_file_text, only: read_text_file
    use rodyn_run, only: run_case
    use rodyn_posix, only: same_path, write_output
+   use rodyn_sweep_config, only: sweep_config
+   use rodyn_sweep_engine, only: run_sweep, sweep_options
+   use rodyn_sweep_reader, only: default_sweep, is_sweep_text, read_sweep
    use rodyn_build_info, only: program_version, git_commit
    implicit none (type, external)
    private
@@ -18,6 +22,9 @@ module rodyn_command_line
       logical :: force = .false.
       logical :: quiet = .false.
       logical :: help = .false.
+      character(len=:), allocatable :: shard  !! --shard
+      logical :: dry_run = .false.
+      logical :: retry_failed = .false.
    end type options_type
 
    character(len=*), parameter :: nl = new_line('a')
@@ -34,13 +41,16 @@ contains
       command = ''
       if (command_argument_count() > 0) command = argument(1)
       select case (command)
-      case ('run', 'check')
+      case ('run', 'check', 'sweep')
          call read_options(options, error)
          if (.not. allocated(error)) then
             if (options%help) then
                call print_text(help_text(command), error)
             else if (command == 'run') then
                call run_file_command(options, error)
+            else if (command == 'sweep') then
+               call sweep_command(options, exit_code, error)
+               if (.not. allocated(error)) return
             else
                call check_command(options, error)
             end if
@@ -93,13 +103,71 @@ contains
       type(options_type), intent(in) :: options
       type(error_type), allocatable, intent(out) :: error
       type(case_config) :: config
+      type(sweep_config) :: sweep
       character(len=:), allocatable :: text
 
-      call read_case(options%file, config, text, error)
+      call read_text_file(options%file, text, error)
+      if (allocated(error)) return
+      if (is_sweep_text(text)) then
+         call read_sweep(options%file, sweep, error)
+      else
+         call read_case(options%file, config, error=error)
+      end if
       if (.not. allocated(error) .and. .not. options%quiet) call print_text(options%file//': valid', error)
    end subroutine check_command
 
-   !> rodyn defaults [run]
+   !> rodyn sweep
+   subroutine sweep_command(options, exit_code, error)
+      type(options_type), intent(in) :: options
+      integer, intent(out) :: exit_code
+      type(error_type), allocatable, intent(out) :: error
+      type(sweep_options) :: sweep
+
+      exit_code = exit_bad_input
+      sweep%file = options%file
+      sweep%output = base_name(options%file)
+      if (allocated(options%output)) sweep%output = options%output
+      sweep%dry_run = options%dry_run
+      sweep%retry_failed = options%retry_failed
+      sweep%force = options%force
+      sweep%quiet = options%quiet
+      if (allocated(options%shard)) call read_shard(options%shard, sweep%shard, sweep%n_shards, error)
+      if (sweep%force .and. sweep%n_shards > 0 .and. .not. allocated(error)) &
+         call raise(error, 'rodyn sweep: --force would remove the results of other shards; use it without --shard', &
+                    exit_bad_input)
+      if (.not. allocated(error)) call run_sweep(sweep, exit_code, error)
+   end subroutine sweep_command
+
+   !> '3/16'
+   subroutine read_shard(text, shard, n_shards, error)
+      character(len=*), intent(in) :: text
+      integer, intent(out) :: shard, n_shards
+      type(error_type), allocatable, intent(out) :: error
+      integer :: slash, stat
+
+      slash = index(text, '/')
+      stat = 1
+      shard = 0
+      n_shards = 0
+      if (verify(text, '0123456789/') == 0 .and. slash > 1 .and. slash < len(text) .and. len(text) <= 13) then
+         read (text(:slash - 1), '(i6)', iostat=stat) shard
+         if (stat == 0) read (text(slash + 1:), '(i6)', iostat=stat) n_shards
+      end if
+      if (stat /= 0 .or. shard < 1 .or. shard > n_shards) call raise(error, &
+         "rodyn sweep: --shard I/N needs numbers with 1 <= I <= N <= 999999, not '"//text//"'", exit_bad_input)
+   end subroutine read_shard
+
+   !> The name of a file without directories and ending.
+   pure function base_name(path) result(name)
+      character(len=*), intent(in) :: path
+      character(len=:), allocatable :: name
+      integer :: dot
+      name = path(index(path, '/', back=.true.) + 1:)
+      dot = index(name, '.', back=.true.)
+      if (dot > 1) name = name(:dot - 1)
+   end function base_name
+
+   !> rodyn defaults [run|sweep]
    subroutine defaults_command(error)
       type(error_type), allocatable, intent(out) :: error
       character(len=:), allocatable :: kind, text
@@ -114,10 +182,17 @@ contains
          end if
          text = default_case()
          call print_text(text(:len(text) - 1), error) ! its last newline is print_text's
+      case ('sweep')
+         if (command_argument_count() > 2) then
+            call raise(error, "rodyn defaults: '"//argument(3)//"' is too much", exit_bad_input)
+            return
+         end if
+         text = default_sweep()
+         call print_text(text(:len(text) - 1), error)
       case ('--help', '-h')
          call print_text(help_text('defaults'), error)
       case default
-         call raise(error, "rodyn defaults: '"//kind//"' is not one of: run", exit_bad_input)
+         call raise(error, "rodyn defaults: '"//kind//"' is not one of: run, sweep", exit_bad_input)
       end select
    end subroutine defaults_command
 
@@ -126,7 +201,6 @@ contains
       type(options_type), intent(in) :: options
       type(case_config), intent(in) :: config
       character(len=:), allocatable :: path
-      integer :: dot, slash
 
       if (allocated(options%output)) then
          path = options%output
@@ -136,11 +210,7 @@ contains
          path = config%output%file
          if (len(path) > 0) return
       end if
-      path = options%file
-      slash = index(path, '/', back=.true.)
-      dot = index(path, '.', back=.true.)
-      if (dot > slash + 1) path = path(:dot - 1)
-      path = path(slash + 1:)//'.h5'
+      path = base_name(options%file)//'.h5'
    end function output_path
 
    !> Arguments behind the command.
@@ -156,18 +226,31 @@ contains
          if (word == '--help' .or. word == '-h') then
             options%help = .true.
             return
-         else if (word == '--force' .and. argument(1) == 'run') then
+         else if (word == '--force' .and. argument(1) /= 'check') then
             options%force = .true.
          else if (word == '--quiet') then
             options%quiet = .true.
-         else if ((word == '--output' .or. word == '-o') .and. argument(1) == 'run') then
+         else if (word == '--dry-run' .and. argument(1) == 'sweep') then
+            options%dry_run = .true.
+         else if (word == '--retry-failed' .and. argument(1) == 'sweep') then
+            options%retry_failed = .true.
+         else if (word == '--shard' .and. argument(1) == 'sweep') then
+            i = i + 1
+            if (i > command_argument_count()) then
+               call raise(error, 'rodyn sweep: --shard needs I/N', exit_bad_input)
+               return
+            end if
+            options%shard = argument(i)
+         else if (index(word, '--shard=') == 1 .and. argument(1) == 'sweep') then
+            options%shard = word(len('--shard=') + 1:)
+         else if ((word == '--output' .or. word == '-o') .and. argument(1) /= 'check') then
             i = i + 1
             if (i > command_argument_count()) then
                call raise(error, 'rodyn '//argument(1)//': --output needs a file name', exit_bad_input)
                return
             end if
             options%output = argument(i)
-         else if (index(word, '--output=') == 1 .and. argument(1) == 'run') then
+         else if (index(word, '--output=') == 1 .and. argument(1) /= 'check') then
             options%output = word(len('--output=') + 1:)
          else if (index(word, '-') == 1 .and. len(word) > 1) then
             call raise(error, 'rodyn '//argument(1)//": there is no option '"//word//"'", exit_bad_input)
@@ -207,17 +290,30 @@ contains
                 '  --force            replace an existing result'//nl// &
                 '  --quiet            print nothing but errors'//nl// &
                 'Exit codes: 0 done, 1 the run failed (the file holds all rows until then), 2 bad input.'
+      case ('sweep')
+         text = 'rodyn sweep SWEEP.nml [--output DIR] [--shard I/N] [--dry-run] [--retry-failed] [--force] [--quiet]'//nl// &
+                '  Compute many variants of a case; the result is DIR/sweep.h5 (default: SWEEP in the working directory).'//nl// &
+                '  Run the same command again to resume; under mpirun or srun the ranks share the cases.'//nl// &
+                '  --output DIR       directory of results; made if it does not exist'//nl// &
+                '  --shard I/N        every N-th case, beginning with the I-th; the last shard to end merges all'//nl// &
+                '  --dry-run          print the table of cases, and an estimate of time and disk'//nl// &
+                '  --retry-failed     compute the failed cases again, and the missing ones'//nl// &
+                '  --force            discard what the directory holds of another sweep or an older one'//nl// &
+                '  --quiet            print nothing but errors'//nl// &
+                'Exit codes: 0 done, 1 a case failed (its states are NaN) or the sweep is incomplete, 2 bad input,'//nl// &
+                '75 stopped by SIGTERM, SIGUSR1 or SIGINT.'
       case ('check')
          text = 'rodyn check FILE.nml [--quiet]'//nl// &
                 '  Validate only: print every fault of the file at once. Exit code 0 or 2.'
       case ('defaults')
-         text = 'rodyn defaults [run]'//nl// &
+         text = 'rodyn defaults [run|sweep]'//nl// &
                 '  Print a complete commented namelist with every key and its default.'
       case default
          text = 'Rodyn '//program_version//': planar dynamics of a chain of elastic rods on a spacecraft'//nl// &
                 '  rodyn run CASE.nml [--output FILE.h5] [--force] [--quiet]   one scene to one HDF5 file'//nl// &
+                '  rodyn sweep SWEEP.nml [--output DIR] [--shard I/N] ...      many scenes to DIR/sweep.h5'//nl// &
                 '  rodyn check FILE.nml                                        validate only'//nl// &
-                '  rodyn defaults [run]                                        a namelist with every key'//nl// &
+                '  rodyn defaults [run|sweep]                                  a namelist with every key'//nl// &
                 '  rodyn --version | --help | COMMAND --help'
       end select
    end function help_text

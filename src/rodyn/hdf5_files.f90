@@ -6,7 +6,7 @@
 !> A failed library call becomes a message with the call, the object, the path and the library's own reason.
 module rodyn_hdf5_files
    use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_funloc, c_funptr, c_int, c_int64_t, c_loc, &
-      c_ptr, c_size_t
+      c_null_char, c_ptr, c_size_t
    use, intrinsic :: iso_fortran_env, only: int32, int64
    use hdf5, only: hid_t, hsize_t, size_t, h5dont_atexit_f, h5open_f, h5get_libversion_f, h5eset_auto_f, &
       h5fcreate_f, h5fopen_f, h5fclose_f, h5fflush_f, h5f_acc_excl_f, h5f_acc_rdonly_f, h5f_close_strong_f, &
@@ -17,9 +17,10 @@ module rodyn_hdf5_files
       h5gcreate_f, h5gclose_f, h5gget_info_by_name_f, h5lexists_f, h5lget_name_by_idx_f, h5_index_name_f, h5_iter_inc_f, &
       h5screate_f, h5screate_simple_f, h5sclose_f, h5s_scalar_f, h5s_unlimited_f, h5s_select_set_f, &
       h5sselect_hyperslab_f, h5sget_simple_extent_ndims_f, h5sget_simple_extent_dims_f, &
-      h5tcopy_f, h5tclose_f, h5tset_size_f, h5tset_strpad_f, h5tset_cset_f, h5tget_size_f, h5tis_variable_str_f, &
+      h5tcopy_f, h5tclose_f, h5tset_size_f, h5tset_strpad_f, h5tset_cset_f, h5tget_size_f, h5tget_class_f, h5t_string_f, &
+      h5tis_variable_str_f, &
       h5t_str_nullpad_f, h5t_cset_utf8_f, h5t_fortran_s1, h5t_ieee_f64le, h5t_std_i32le, h5t_std_i64le, &
-      h5t_native_double, h5kind_to_type, h5_integer_kind, &
+      h5t_native_double, h5t_string, h5kind_to_type, h5_integer_kind, &
       h5dcreate_f, h5dopen_f, h5dclose_f, h5dwrite_f, h5dread_f, h5dset_extent_f, h5dget_space_f, &
       h5acreate_by_name_f, h5aopen_by_name_f, h5aexists_by_name_f, h5adelete_by_name_f, h5aclose_f, h5awrite_f, &
       h5aread_f, h5aget_type_f
@@ -45,7 +46,7 @@ module rodyn_hdf5_files
       procedure :: close => close_file
       procedure :: create_group
       procedure :: create_series
-      generic :: append => append_1, append_2
+      generic :: append => append_1, append_2, append_3, append_int64, append_texts
       generic :: write => write_integer_1, write_real_1, write_real_2, write_real_3
       procedure :: make_scale
       procedure :: attach_scale
@@ -57,7 +58,7 @@ module rodyn_hdf5_files
       generic :: read => read_integer_1, read_real_1, read_real_2, read_real_3
       generic :: get_attribute => get_text, get_real, get_int32, get_int64, get_logical
       procedure, private :: failed
-      procedure, private :: append_1, append_2, append_block
+      procedure, private :: append_1, append_2, append_3, append_int64, append_texts, append_block
       procedure, private :: write_integer_1, write_real_1, write_real_2, write_real_3, write_whole
       procedure, private :: put_text, put_real, put_int32, put_int64, put_logical, put_number
       procedure, private :: read_integer_1, read_real_1, read_real_2, read_real_3, read_whole
@@ -196,20 +197,25 @@ contains
 
    !> Make an empty real data set that grows along its last dimension, time. It is chunked, compressed and
    !> checksummed; blocks of `chunk_rows` rows are written fastest.
-   subroutine create_series(self, name, row_shape, chunk_rows, compression, error)
+   subroutine create_series(self, name, row_shape, chunk_rows, compression, error, kind_of)
       class(hdf5_file), intent(in) :: self
       character(len=*), intent(in) :: name
       integer, intent(in) :: row_shape(:) !! shape of one row; empty: one number per time
       integer, intent(in) :: chunk_rows   !! rows per chunk, >= 1
       integer, intent(in) :: compression  !! gzip level, 0..9
       type(error_type), allocatable, intent(out) :: error
+      character(len=*), intent(in), optional :: kind_of !! 'real' (default), 'integer' of 64 bits, or 'text'
       integer(hsize_t) :: extent(size(row_shape) + 1)
-      integer(hid_t) :: set
+      integer(hid_t) :: file_type, set
       integer :: status
 
+      file_type = h5t_ieee_f64le
+      if (present(kind_of)) then
+         if (kind_of == 'integer') file_type = h5t_std_i64le
+         if (kind_of == 'text') file_type = utf8_text()
+      end if
       extent = int([row_shape, 0], hsize_t)
-      call new_dataset(self, name, h5t_ieee_f64le, extent, int([row_shape, chunk_rows], hsize_t), .true., compression, &
-         set, error)
+      call new_dataset(self, name, file_type, extent, int([row_shape, chunk_rows], hsize_t), .true., compression, set, error)
       if (allocated(error)) return
       call h5dclose_f(set, status)
       if (self%failed(status, 'h5dclose_f', name, error)) return
@@ -222,7 +228,7 @@ contains
       real(wp), intent(in), contiguous, target :: values(:) !! (time)
       type(error_type), allocatable, intent(out) :: error
       if (size(values) == 0) return
-      call self%append_block(name, c_loc(values), int(shape(values), hsize_t), error)
+      call self%append_block(name, h5t_native_double, c_loc(values), int(shape(values), hsize_t), error)
    end subroutine append_1
 
    !> Append rows to a series.
@@ -232,14 +238,65 @@ contains
       real(wp), intent(in), contiguous, target :: values(:, :) !! (rod, time)
       type(error_type), allocatable, intent(out) :: error
       if (size(values) == 0) return
-      call self%append_block(name, c_loc(values), int(shape(values), hsize_t), error)
+      call self%append_block(name, h5t_native_double, c_loc(values), int(shape(values), hsize_t), error)
    end subroutine append_2
 
-   !> Extend a data set along its last dimension and fill the new part.
-   subroutine append_block(self, name, values, counts, error)
+   !> Append tables to a series.
+   subroutine append_3(self, name, values, error)
       class(hdf5_file), intent(in) :: self
       character(len=*), intent(in) :: name
-      type(c_ptr), intent(in) :: values         !! real(wp), contiguous
+      real(wp), intent(in), contiguous, target :: values(:, :, :)
+      type(error_type), allocatable, intent(out) :: error
+      if (size(values) == 0) return
+      call self%append_block(name, h5t_native_double, c_loc(values), int(shape(values), hsize_t), error)
+   end subroutine append_3
+
+   !> Append whole numbers to a series of integers.
+   subroutine append_int64(self, name, values, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer(int64), intent(in), contiguous, target :: values(:)
+      type(error_type), allocatable, intent(out) :: error
+      if (size(values) == 0) return
+      call self%append_block(name, h5kind_to_type(int64, h5_integer_kind), c_loc(values), int(shape(values), hsize_t), error)
+   end subroutine append_int64
+
+   !> Append texts, of any length, to a series of texts.
+   subroutine append_texts(self, name, values, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: name
+      character(len=*), intent(in) :: values(:) !! trailing blanks do not count
+      type(error_type), allocatable, intent(out) :: error
+      character(kind=c_char, len=len(values) + 1), allocatable, target :: texts(:)
+      type(c_ptr), allocatable, target :: pointers(:)
+      integer(hid_t) :: memory_type
+      integer :: i, status
+
+      if (size(values) == 0) return
+      allocate (texts(size(values)), pointers(size(values)))
+      do i = 1, size(values)
+         texts(i) = trim(values(i))//c_null_char
+         pointers(i) = c_loc(texts(i))
+      end do
+      memory_type = utf8_text()
+      call self%append_block(name, memory_type, c_loc(pointers), [size(values, kind=hsize_t)], error)
+      call h5tclose_f(memory_type, status)
+   end subroutine append_texts
+
+   !> The type of texts of any length.
+   function utf8_text() result(text_type)
+      integer(hid_t) :: text_type
+      integer :: status
+      call h5tcopy_f(h5t_string, text_type, status)
+      call h5tset_cset_f(text_type, h5t_cset_utf8_f, status)
+   end function utf8_text
+
+   !> Extend a data set along its last dimension and fill the new part.
+   subroutine append_block(self, name, memory_type, values, counts, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer(hid_t), intent(in) :: memory_type
+      type(c_ptr), intent(in) :: values         !! contiguous, of that type
       integer(hsize_t), intent(in) :: counts(:) !! shape of values
       type(error_type), allocatable, intent(out) :: error
       integer(hid_t) :: set, file_space, memory_space
@@ -262,7 +319,7 @@ contains
          if (self%failed(status, 'h5dget_space_f', name, error)) exit work
          call h5sselect_hyperslab_f(file_space, h5s_select_set_f, start, counts, status)
          call h5screate_simple_f(rank, counts, memory_space, status)
-         call h5dwrite_f(set, h5t_native_double, values, status, memory_space, file_space)
+         call h5dwrite_f(set, memory_type, values, status, memory_space, file_space)
          if (self%failed(status, 'h5dwrite_f', name, error)) continue
          call h5sclose_f(memory_space, status)
          call h5sclose_f(file_space, status)
@@ -349,7 +406,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       integer(hsize_t) :: most(size(extent))
       integer(hid_t) :: space, creation_list
-      integer :: status
+      integer :: class, status
 
       set = -1_hid_t
       most = extent
@@ -361,6 +418,12 @@ contains
          call h5pset_obj_track_times_f(creation_list, .false., status)
          call h5pset_chunk_f(creation_list, size(chunk), chunk, status)
          if (self%failed(status, 'h5pset_chunk_f', name, error)) exit work
+         call h5tget_class_f(file_type, class, status)
+         if (class == h5t_string_f) then ! texts of any length stand elsewhere in the file, filters cannot reach them
+            call h5dcreate_f(self%id, name, file_type, space, set, status, dcpl_id=creation_list)
+            if (self%failed(status, 'h5dcreate_f', name, error)) exit work
+            exit work
+         end if
          if (compression > 0) then
             call h5pset_shuffle_f(creation_list, status)
             if (self%failed(status, 'h5pset_shuffle_f', name, error)) exit work

@@ -1,8 +1,11 @@
 !> The LAPACK and BLAS routines in use, with their interfaces; the only module that names them.
 module rodyn_lapack
    use rodyn_kinds, only: wp
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_procpointer, c_funptr, c_int, c_null_char, c_null_ptr, &
+      c_ptr
    implicit none (type, external)
    private
+   public :: use_one_thread
    public :: dpotrf, dpotrs, dgesv, dsygvd, dgemv
 
    interface
@@ -62,5 +65,35 @@ module rodyn_lapack
          real(wp), intent(inout) :: y(*)
       end subroutine dgemv
    end interface
+
+contains
+
+   !> Have the library compute in the calling thread. OpenBLAS would start one per core for the smallest matrix, and
+   !> the processes of a sweep have a core each already. Other libraries are left as they are.
+   subroutine use_one_thread()
+      abstract interface
+         subroutine set_threads(n) bind(c)
+            import :: c_int
+            implicit none (type, external)
+            integer(c_int), value :: n
+         end subroutine set_threads
+      end interface
+      interface
+         function posix_dlsym(library, name) result(address) bind(c, name='dlsym')
+            import :: c_char, c_funptr, c_ptr
+            implicit none (type, external)
+            type(c_ptr), value :: library !! null: everything that is loaded
+            character(kind=c_char), intent(in) :: name(*)
+            type(c_funptr) :: address
+         end function posix_dlsym
+      end interface
+      procedure(set_threads), pointer :: set
+      type(c_funptr) :: address
+
+      address = posix_dlsym(c_null_ptr, 'openblas_set_num_threads'//c_null_char)
+      if (.not. c_associated(address)) return
+      call c_f_procpointer(address, set)
+      call set(1_c_int)
+   end subroutine use_one_thread
 
 end module rodyn_lapack

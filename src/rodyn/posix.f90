@@ -1,4 +1,4 @@
-!> The few POSIX calls the program needs; the only module that knows the C library (Linux: glibc or musl).
+!> The few POSIX calls the program needs (Linux: glibc or musl). Those of sweeps are in `rodyn_posix_files`.
 !>
 !> Calls that can fail return the reason as text, empty on success, so that callers word their own messages.
 module rodyn_posix
@@ -10,6 +10,7 @@ module rodyn_posix
    public :: path_exists, same_path, is_directory, is_writable, parent_directory
    public :: sync_path, rename_over, rename_new, remove_file
    public :: ignore_file_size_signal, write_output
+   public :: last_failure, last_failure_is
 
    integer(c_int), parameter :: f_ok = 0, w_ok = 2, x_ok = 1               ! <unistd.h>
    integer(c_int), parameter :: o_rdonly = 0                               ! <fcntl.h>
@@ -365,6 +366,13 @@ contains
       character(len=:), allocatable :: text
       text = error_text(errno())
    end function last_failure
+
+   !> Did the last call fail for this reason (an errno of Linux)?
+   function last_failure_is(number) result(same)
+      integer, intent(in) :: number
+      logical :: same
+      same = errno() == int(number, c_int)
+   end function last_failure_is
 
    function errno() result(number)
       integer(c_int) :: number

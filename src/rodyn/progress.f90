@@ -6,7 +6,7 @@ module rodyn_progress
    use rodyn_integrator, only: monitor_type, time_text
    implicit none (type, external)
    private
-   public :: progress_monitor, new_progress, progress_line, duration_text
+   public :: progress_monitor, new_progress, progress_line, duration_text, is_terminal
 
    !> Prints while a run goes on; see `new_progress`. Extend it to answer `stop_requested`.
    type, extends(monitor_type) :: progress_monitor
@@ -43,15 +43,19 @@ contains
       logical, intent(in) :: quiet           !! print nothing
       type(progress_monitor) :: self
 
-      integer(c_int), parameter :: standard_error = 2_c_int
-
       self%t_start = t_start
       self%t_end = t_end
       self%quiet = quiet
-      self%terminal = c_isatty(standard_error) == 1_c_int
+      self%terminal = is_terminal()
       call system_clock(self%clock_start)
       self%clock_print = self%clock_start
    end function new_progress
+
+   !> Is standard error a terminal?
+   logical function is_terminal()
+      integer(c_int), parameter :: standard_error = 2_c_int
+      is_terminal = c_isatty(standard_error) == 1_c_int
+   end function is_terminal
 
    !> Print, if it is time to.
    subroutine report(self, t, n_steps)

@@ -19,7 +19,7 @@ module rodyn_run
    use rodyn_notes, only: notes_on
    implicit none (type, external)
    private
-   public :: run_case
+   public :: run_case, options_of
 
    !> Takes rows down into the run file.
    type, extends(observer_type) :: recorder_type

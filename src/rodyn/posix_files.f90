@@ -1,0 +1,410 @@
+!> POSIX for sweeps: durable small files, directories, locks that die with their process, signals that ask to stop.
+!>
+!> Calls that can fail return the reason as text, empty on success.
+module rodyn_posix_files
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_funloc, c_funptr, c_int, c_int16_t, &
+      c_int64_t, c_loc, c_long, c_null_char, c_ptr, c_size_t
+   use rodyn_errors, only: error_type, raise
+   use rodyn_kinds, only: i8
+   use rodyn_posix, only: last_failure, last_failure_is, parent_directory, path_exists, rename_over, sync_path
+   implicit none (type, external)
+   private
+   public :: make_directory, list_directory
+   public :: write_words, read_words, write_text_file, append_text, file_bytes
+   public :: lock_file, open_lock, take_lock, lock_holder, release_lock
+   public :: watch_signals, stop_signal
+
+   integer(c_int), parameter :: o_wronly = 1, o_append = 1024            ! <fcntl.h>, Linux
+   integer(c_int), parameter :: f_getlk = 5, f_setlk = 6, f_setlkw = 7   ! <fcntl.h>, Linux, 64 bit
+   integer(c_int16_t), parameter :: f_wrlck = 1, f_unlck = 2, seek_set = 0
+   integer(c_int), parameter :: file_mode = int(o'644', c_int), directory_mode = int(o'755', c_int)
+   integer, parameter :: eexist = 17                                     ! <errno.h>
+   integer(c_int), parameter :: sigint = 2, sigusr1 = 10, sigterm = 15   ! <signal.h>, Linux
+   integer, parameter :: name_offset = 19                                ! of d_name in struct dirent, Linux, 64 bit
+   integer, parameter :: longest_name = 255
+
+   !> A file whose bytes are locked, not its content. One descriptor per process.
+   type :: lock_file
+      integer(c_int) :: descriptor = -1
+      character(len=:), allocatable :: path
+   end type lock_file
+
+   !> struct flock of Linux, 64 bit
+   type, bind(c) :: flock_record
+      integer(c_int16_t) :: kind
+      integer(c_int16_t) :: whence
+      integer(c_int64_t) :: start
+      integer(c_int64_t) :: length
+      integer(c_int) :: pid
+   end type flock_record
+
+   !> The signal that came; 0: none.
+   integer(c_int), volatile :: caught = 0
+
+   interface
+      function posix_creat(path, mode) result(descriptor) bind(c, name='creat')
+         import :: c_char, c_int
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_int), value :: mode
+         integer(c_int) :: descriptor
+      end function posix_creat
+
+      ! variadic in C; without its third argument the call is an ordinary one
+      function posix_open(path, flags) result(descriptor) bind(c, name='open')
+         import :: c_char, c_int
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_int), value :: flags
+         integer(c_int) :: descriptor
+      end function posix_open
+
+      function posix_write(descriptor, data, bytes) result(written) bind(c, name='write')
+         import :: c_int, c_long, c_ptr, c_size_t
+         implicit none (type, external)
+         integer(c_int), value :: descriptor
+         type(c_ptr), value :: data
+         integer(c_size_t), value :: bytes
+         integer(c_long) :: written
+      end function posix_write
+
+      function posix_close(descriptor) result(status) bind(c, name='close')
+         import :: c_int
+         implicit none (type, external)
+         integer(c_int), value :: descriptor
+         integer(c_int) :: status
+      end function posix_close
+
+      function posix_fsync(descriptor) result(status) bind(c, name='fsync')
+         import :: c_int
+         implicit none (type, external)
+         integer(c_int), value :: descriptor
+         integer(c_int) :: status
+      end function posix_fsync
+
+      function posix_mkdir(path, mode) result(status) bind(c, name='mkdir')
+         import :: c_char, c_int
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_int), value :: mode
+         integer(c_int) :: status
+      end function posix_mkdir
+
+      function posix_opendir(path) result(stream) bind(c, name='opendir')
+         import :: c_char, c_ptr
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+         type(c_ptr) :: stream
+      end function posix_opendir
+
+      function posix_readdir(stream) result(entry) bind(c, name='readdir')
+         import :: c_ptr
+         implicit none (type, external)
+         type(c_ptr), value :: stream
+         type(c_ptr) :: entry
+      end function posix_readdir
+
+      function posix_closedir(stream) result(status) bind(c, name='closedir')
+         import :: c_int, c_ptr
+         implicit none (type, external)
+         type(c_ptr), value :: stream
+         integer(c_int) :: status
+      end function posix_closedir
+
+      ! variadic in C; with integers and pointers only, all calling conventions of Linux pass these the same way
+      function posix_fcntl(descriptor, command, lock) result(status) bind(c, name='fcntl')
+         import :: c_int, flock_record
+         implicit none (type, external)
+         integer(c_int), value :: descriptor, command
+         type(flock_record), intent(inout) :: lock
+         integer(c_int) :: status
+      end function posix_fcntl
+
+      function posix_signal(number, handler) result(previous) bind(c, name='signal')
+         import :: c_funptr, c_int
+         implicit none (type, external)
+         integer(c_int), value :: number
+         type(c_funptr), value :: handler
+         type(c_funptr) :: previous
+      end function posix_signal
+   end interface
+
+contains
+
+   !> Make a directory and those above it; fine if it exists.
+   recursive function make_directory(path) result(failure)
+      character(len=*), intent(in) :: path
+      character(len=:), allocatable :: failure
+      character(len=:), allocatable :: above
+
+      failure = ''
+      if (path_exists(path)) return
+      above = parent_directory(path)
+      if (above /= path .and. .not. path_exists(above)) failure = make_directory(above)
+      if (len(failure) > 0) return
+      if (posix_mkdir(path//c_null_char, directory_mode) == 0) return
+      if (.not. last_failure_is(eexist)) failure = last_failure()
+   end function make_directory
+
+   !> Names in a directory, sorted, without those that begin with a dot.
+   subroutine list_directory(path, names)
+      character(len=*), intent(in) :: path
+      character(len=longest_name), allocatable, intent(out) :: names(:) !! empty if it cannot be read
+      character(len=longest_name), allocatable :: larger(:)
+      character(len=longest_name) :: name
+      character(kind=c_char), pointer :: bytes(:)
+      type(c_ptr) :: stream, entry
+      integer(c_int) :: status
+      integer :: i, n
+
+      allocate (names(64))
+      n = 0
+      stream = posix_opendir(path//c_null_char)
+      if (c_associated(stream)) then
+         do
+            entry = posix_readdir(stream)
+            if (.not. c_associated(entry)) exit
+            call c_f_pointer(entry, bytes, [name_offset + longest_name + 1])
+            name = ''
+            do i = 1, longest_name
+               if (bytes(name_offset + i) == c_null_char) exit
+               name(i:i) = bytes(name_offset + i)
+            end do
+            if (name(1:1) == '.') cycle
+            if (n == size(names)) then
+               allocate (larger(2*n))
+               larger(:n) = names
+               call move_alloc(larger, names)
+            end if
+            n = n + 1
+            names(n) = name
+         end do
+         status = posix_closedir(stream)
+      end if
+      names = names(:n)
+      call sort_names(names)
+   end subroutine list_directory
+
+   !> Merge sort.
+   recursive subroutine sort_names(names)
+      character(len=longest_name), intent(inout) :: names(:)
+      character(len=longest_name), allocatable :: left(:), right(:)
+      integer :: half, i, j, k
+
+      if (size(names) < 2) return
+      half = size(names)/2
+      left = names(:half)
+      right = names(half + 1:)
+      call sort_names(left)
+      call sort_names(right)
+      i = 1
+      j = 1
+      do k = 1, size(names)
+         if (j > size(right)) then
+            names(k) = left(i)
+            i = i + 1
+         else if (i > size(left)) then
+            names(k) = right(j)
+            j = j + 1
+         else if (left(i) <= right(j)) then
+            names(k) = left(i)
+            i = i + 1
+         else
+            names(k) = right(j)
+            j = j + 1
+         end if
+      end do
+   end subroutine sort_names
+
+   !> Write a file that is there whole or not at all: temporary name, data to the disk, rename, name to the disk.
+   function write_words(path, words) result(failure)
+      character(len=*), intent(in) :: path
+      integer(i8), intent(in), contiguous, target :: words(:)
+      character(len=:), allocatable :: failure
+      failure = write_durably(path, c_loc(words), 8_c_size_t*size(words, kind=c_size_t))
+   end function write_words
+
+   !> The same for a text; an existing file is replaced in one instant.
+   function write_text_file(path, text) result(failure)
+      character(len=*), intent(in) :: path
+      character(len=*), intent(in), target :: text
+      character(len=:), allocatable :: failure
+      failure = write_durably(path, c_loc(text), len(text, kind=c_size_t))
+   end function write_text_file
+
+   function write_durably(path, data, bytes) result(failure)
+      character(len=*), intent(in) :: path
+      type(c_ptr), intent(in) :: data
+      integer(c_size_t), intent(in) :: bytes
+      character(len=:), allocatable :: failure
+      character(len=:), allocatable :: temporary
+      integer(c_int) :: descriptor
+
+      temporary = path//'.tmp'
+      descriptor = posix_creat(temporary//c_null_char, file_mode)
+      if (descriptor < 0) then
+         failure = last_failure()
+         return
+      end if
+      failure = write_and_close(descriptor, data, bytes)
+      if (len(failure) == 0) failure = rename_over(temporary, path)
+      if (len(failure) == 0) failure = sync_path(parent_directory(path))
+   end function write_durably
+
+   !> All bytes, then onto the disk.
+   function write_and_close(descriptor, data, bytes) result(failure)
+      integer(c_int), intent(in) :: descriptor
+      type(c_ptr), intent(in) :: data
+      integer(c_size_t), intent(in) :: bytes
+      character(len=:), allocatable :: failure
+      character(kind=c_char), pointer :: rest(:)
+      integer(c_size_t) :: done
+      integer(c_long) :: written
+      integer(c_int) :: status
+
+      failure = ''
+      done = 0
+      if (bytes > 0) call c_f_pointer(data, rest, [bytes])
+      do while (done < bytes)
+         written = posix_write(descriptor, c_loc(rest(done + 1)), bytes - done)
+         if (written <= 0) then
+            failure = last_failure()
+            exit
+         end if
+         done = done + written
+      end do
+      if (len(failure) == 0) then
+         if (posix_fsync(descriptor) /= 0) failure = last_failure()
+      end if
+      status = posix_close(descriptor)
+      if (status /= 0 .and. len(failure) == 0) failure = last_failure()
+   end function write_and_close
+
+   !> Append a text in one write and put it onto the disk.
+   function append_text(path, text) result(failure)
+      character(len=*), intent(in) :: path
+      character(len=*), intent(in), target :: text
+      character(len=:), allocatable :: failure
+      integer(c_int) :: descriptor
+
+      if (path_exists(path)) then
+         descriptor = posix_open(path//c_null_char, ior(o_wronly, o_append))
+      else
+         descriptor = posix_creat(path//c_null_char, file_mode)
+      end if
+      if (descriptor < 0) then
+         failure = last_failure()
+         return
+      end if
+      failure = write_and_close(descriptor, c_loc(text), len(text, kind=c_size_t))
+   end function append_text
+
+   !> Size of a file; -1 if it cannot be read.
+   function file_bytes(path) result(bytes)
+      character(len=*), intent(in) :: path
+      integer(i8) :: bytes
+      inquire (file=path, size=bytes)
+   end function file_bytes
+
+   !> A whole file as words. What is no whole number of words, or cannot be read, gives none.
+   subroutine read_words(path, words)
+      character(len=*), intent(in) :: path
+      integer(i8), allocatable, intent(out) :: words(:)
+      integer(i8) :: bytes
+      integer :: unit, stat
+
+      bytes = file_bytes(path)
+      if (bytes <= 0 .or. modulo(bytes, 8_i8) /= 0) then
+         allocate (words(0))
+         return
+      end if
+      allocate (words(bytes/8))
+      open (newunit=unit, file=path, access='stream', form='unformatted', status='old', action='read', iostat=stat)
+      if (stat == 0) then
+         read (unit, iostat=stat) words
+         close (unit)
+      end if
+      if (stat /= 0) words = words(:0)
+   end subroutine read_words
+
+   !> Open, perhaps make, a lock file. It is never removed: a lock is on its bytes and ends with the process.
+   subroutine open_lock(self, path, error)
+      type(lock_file), intent(out) :: self
+      character(len=*), intent(in) :: path
+      type(error_type), allocatable, intent(out) :: error
+
+      self%path = path
+      if (path_exists(path)) then
+         self%descriptor = posix_open(path//c_null_char, o_wronly)
+      else
+         self%descriptor = posix_creat(path//c_null_char, file_mode)
+      end if
+      if (self%descriptor < 0) call raise(error, path//': cannot be opened: '//last_failure())
+   end subroutine open_lock
+
+   !> Lock bytes for this process alone; false if another process has one of them.
+   function take_lock(self, start, length, wait) result(taken)
+      type(lock_file), intent(in) :: self
+      integer(i8), intent(in) :: start, length !! length 0: to the end of all
+      logical, intent(in) :: wait              !! until they are free
+      logical :: taken
+      type(flock_record) :: record
+
+      record = flock_record(f_wrlck, seek_set, start, length, 0)
+      taken = posix_fcntl(self%descriptor, merge(f_setlkw, f_setlk, wait), record) == 0
+   end function take_lock
+
+   !> Process that has locked one of these bytes; 0: none.
+   function lock_holder(self, start, length) result(pid)
+      type(lock_file), intent(in) :: self
+      integer(i8), intent(in) :: start, length
+      integer :: pid
+      type(flock_record) :: record
+
+      pid = 0
+      if (length < 0) return
+      record = flock_record(f_wrlck, seek_set, start, length, 0)
+      if (posix_fcntl(self%descriptor, f_getlk, record) /= 0) return
+      if (record%kind == f_unlck) return
+      pid = int(record%pid)
+      if (pid == 0) pid = -1 ! on another machine
+   end function lock_holder
+
+   subroutine release_lock(self, start, length)
+      type(lock_file), intent(in) :: self
+      integer(i8), intent(in) :: start, length
+      type(flock_record) :: record
+      integer(c_int) :: status
+      record = flock_record(f_unlck, seek_set, start, length, 0)
+      status = posix_fcntl(self%descriptor, f_setlk, record)
+   end subroutine release_lock
+
+   !> From now on SIGTERM, SIGUSR1 and SIGINT only leave a note.
+   subroutine watch_signals()
+      type(c_funptr) :: previous
+      previous = posix_signal(sigterm, c_funloc(note_signal))
+      previous = posix_signal(sigusr1, c_funloc(note_signal))
+      previous = posix_signal(sigint, c_funloc(note_signal))
+   end subroutine watch_signals
+
+   subroutine note_signal(number) bind(c)
+      integer(c_int), value :: number
+      caught = number
+   end subroutine note_signal
+
+   !> Name of the signal that asks to stop; empty: none came.
+   function stop_signal() result(name)
+      character(len=:), allocatable :: name
+      select case (caught)
+      case (0)
+         name = ''
+      case (sigterm)
+         name = 'SIGTERM'
+      case (sigusr1)
+         name = 'SIGUSR1'
+      case default
+         name = 'SIGINT'
+      end select
+   end function stop_signal
+
+end module rodyn_posix_files

@@ -1,0 +1,405 @@
+!> One case of a sweep: from its place on the axes to the states that are kept.
+!>
+!> Whatever goes wrong stays in this case: its states are NaN, and `status`, `message` and `t_reached` say why.
+module rodyn_sweep_case
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
+   use rodyn_kinds, only: wp, i8
+   use rodyn_case_config, only: case_config
+   use rodyn_case_reader, only: case_from_document
+   use rodyn_errors, only: error_type, raise, exit_stopped
+   use rodyn_integrator, only: integrator_type, monitor_type, solver_statistics
+   use rodyn_integrators, only: new_integrator
+   use rodyn_ledger, only: fill_row
+   use rodyn_method_choice, only: method_choice, choose_method
+   use rodyn_motion, only: motion_type, new_motion, initial_state
+   use rodyn_namelist_document, only: namelist_document
+   use rodyn_namelist_edit, only: set_value
+   use rodyn_run, only: options_of
+   use rodyn_run_file, only: run_row, new_run_row
+   use rodyn_scene, only: scene_type, new_scene
+   use rodyn_simulation, only: observer_type, simulate
+   use rodyn_sweep_config, only: sweep_config, is_ratio, value_text
+   use rodyn_sweep_plan, only: sweep_plan
+   implicit none (type, external)
+   private
+   public :: case_result, case_shape, pulse_type, build_case, build_values, run_sweep_case, new_case_shape
+   public :: status_done, status_failed, status_stopped
+
+   integer, parameter :: status_done = 1, status_failed = 2
+   integer, parameter :: status_stopped = 3 !! by a signal: no result, to be done again
+
+   !> Sizes that all cases of a sweep have in common.
+   type :: case_shape
+      integer :: n_rods = 0   !! of the longest chain; shorter ones end in NaN
+      integer :: n_states = 0 !! 6 n_rods + 6: phi, alpha, beta, their rates, then velocity, displacement and rotation
+      integer :: n_probes = 0
+      integer :: n_rows = 0   !! of the longest series; 0: no series are kept
+      logical :: outputs = .false. !! the states at the n_outputs times are made, whether they are kept or not
+   end type case_shape
+
+   !> What is kept of a case. States in the order of `case_shape`.
+   type :: case_result
+      integer :: case = 0
+      integer :: status = status_stopped
+      integer :: attempt = 1                  !! 2, 3, ...: after --retry-failed
+      integer(i8) :: n_steps = 0, n_rhs = 0
+      real(wp) :: t_reached = 0.0_wp          !! last good time [s]
+      real(wp) :: wall_seconds = 0.0_wp       !! whole case
+      real(wp) :: integration_seconds = 0.0_wp !! of them, inside the integration
+      character(len=:), allocatable :: message
+      real(wp), allocatable :: final(:)       !! (n_states)
+      real(wp), allocatable :: probes(:, :)   !! (n_states, n_probes); NaN beyond the end of the case
+      real(wp), allocatable :: times(:)       !! (n_rows) [s]; NaN beyond the last row
+      real(wp), allocatable :: series(:, :)   !! (n_states, n_rows)
+   end type case_result
+
+   !> Someone who is shown about 50 times a second that work goes on, and may want it stopped.
+   type, abstract :: pulse_type
+   contains
+      procedure(beat_interface), deferred :: beat
+   end type pulse_type
+
+   abstract interface
+      subroutine beat_interface(self, stop_now)
+         import :: pulse_type
+         implicit none (type, external)
+         class(pulse_type), intent(inout) :: self
+         logical, intent(out) :: stop_now
+      end subroutine beat_interface
+   end interface
+
+   !> Stops a case that takes too long, or when the pulse says so.
+   type, extends(monitor_type) :: case_monitor
+      class(pulse_type), pointer :: pulse => null()
+      integer(i8) :: clock_start = 0
+      real(wp) :: limit = 0.0_wp !! wall time [s]; 0: none
+      logical, pointer :: late => null()
+   contains
+      procedure :: report
+      procedure :: stop_requested
+   end type case_monitor
+
+   !> Takes down the states that are kept.
+   type, extends(observer_type) :: keeper_type
+      type(run_row) :: row
+      integer :: n_rods = 0                  !! of the sweep
+      integer, allocatable :: probe_of(:)    !! of each time; 0: none
+      integer, allocatable :: output_of(:)   !! row of the series of each time; 0: none
+      logical :: keep_series = .false.
+      integer :: seen = 0                    !! times so far
+      type(case_result), pointer :: kept => null()
+   contains
+      procedure :: observe
+   end type keeper_type
+
+contains
+
+   !> Sizes of the results of a sweep.
+   subroutine new_case_shape(shape, sweep)
+      type(case_shape), intent(out) :: shape
+      type(sweep_config), intent(in) :: sweep
+      integer :: a, n_outputs
+
+      shape%n_rods = sweep%base_case%chain%n_rods
+      n_outputs = sweep%base_case%n_outputs
+      shape%outputs = sweep%keep_series
+      do a = 1, size(sweep%axes)
+         select case (sweep%axes(a)%key)
+         case ('chain.n_rods')
+            shape%n_rods = nint(maxval(sweep%axes(a)%numbers))
+         case ('case.n_outputs')
+            n_outputs = nint(maxval(sweep%axes(a)%numbers))
+            shape%outputs = .true.
+         case default ! changes no size
+         end select
+      end do
+      shape%n_states = 6*shape%n_rods + 6
+      shape%n_probes = size(sweep%probe_times)
+      if (sweep%keep_series) shape%n_rows = n_outputs + 1
+   end subroutine new_case_shape
+
+   !> The configuration of case number `case`.
+   subroutine build_case(sweep, plan, case, config, error)
+      type(sweep_config), intent(in) :: sweep
+      type(sweep_plan), intent(in) :: plan
+      integer, intent(in) :: case
+      type(case_config), intent(out) :: config
+      type(error_type), allocatable, intent(out) :: error
+      call build_values(sweep, plan%rows(case), config, error)
+   end subroutine build_case
+
+   !> The configuration with the given row of each dimension.
+   subroutine build_values(sweep, rows, config, error)
+      type(sweep_config), intent(in) :: sweep
+      integer, intent(in) :: rows(:) !! (dimensions)
+      type(case_config), intent(out) :: config
+      type(error_type), allocatable, intent(out) :: error
+      type(namelist_document) :: document
+      integer :: a
+
+      document = sweep%base
+      do a = 1, size(sweep%axes)
+         associate (axis => sweep%axes(a))
+            if (is_ratio(axis)) cycle
+            call set_value(document, trim(axis%key), value_text(axis, rows(axis%dimension)), error)
+            if (allocated(error)) return
+            if (axis%key /= 'model.inertia' .or. any(sweep%axes%key == 'model.bending')) cycle
+            call follow_inertia(document, trim(sweep%base_case%model%bending), axis%texts(rows(axis%dimension)), error)
+            if (allocated(error)) return
+         end associate
+      end do
+      call case_from_document(document, config, error)
+      if (allocated(error)) return
+      do a = 1, size(sweep%axes)
+         associate (axis => sweep%axes(a), chain => config%chain)
+            if (is_ratio(axis)) chain%node_mass(:) = axis%numbers(rows(axis%dimension))* &
+               sum(chain%length*chain%mass_per_length)/chain%n_rods
+         end associate
+      end do
+   end subroutine build_values
+
+   !> Rods without inertia cannot swing by themselves: where an axis changes the inertia and none the bending,
+   !> 'dynamic' becomes 'quasistatic' for lumped mass, and the reverse for distributed mass.
+   subroutine follow_inertia(document, bending, inertia, error)
+      type(namelist_document), intent(inout) :: document
+      character(len=*), intent(in) :: bending !! of the base
+      character(len=*), intent(in) :: inertia !! of the case
+      type(error_type), allocatable, intent(out) :: error
+
+      if (inertia == 'lumped' .and. bending == 'dynamic') then
+         call set_value(document, 'model.bending', "'quasistatic'", error)
+      else if (inertia == 'distributed' .and. bending == 'quasistatic') then
+         call set_value(document, 'model.bending', "'dynamic'", error)
+      end if
+   end subroutine follow_inertia
+
+   !> Compute one case. Nothing that happens to it is an error of the sweep.
+   subroutine run_sweep_case(sweep, plan, shape, case, pulse, kept)
+      type(sweep_config), intent(in) :: sweep
+      type(sweep_plan), intent(in) :: plan
+      type(case_shape), intent(in) :: shape
+      integer, intent(in) :: case
+      class(pulse_type), target, intent(inout) :: pulse
+      type(case_result), target, intent(inout) :: kept !! its arrays are used again
+      type(case_config) :: config
+      type(error_type), allocatable :: error
+      integer(i8) :: clock_start, clock_end, clock_rate
+      logical, target :: late
+
+      call system_clock(clock_start, clock_rate)
+      call clear(kept, shape, case)
+      late = .false.
+      call build_case(sweep, plan, case, config, error)
+      if (.not. allocated(error)) call integrate(config, sweep, shape, pulse, clock_start, late, kept, error)
+      call system_clock(clock_end)
+      kept%wall_seconds = real(clock_end - clock_start, wp)/real(clock_rate, wp)
+      kept%status = status_done
+      if (.not. allocated(error)) return
+      kept%status = status_failed
+      kept%message = error%message
+      if (late) then
+         kept%message = 'case_seconds = '//short(sweep%case_seconds)//' s exceeded'
+      else if (error%exit_code == exit_stopped) then
+         kept%status = status_stopped
+      end if
+      call make_nan(kept)
+   end subroutine run_sweep_case
+
+   !> Ready for a case.
+   subroutine clear(kept, shape, case)
+      type(case_result), intent(inout) :: kept
+      type(case_shape), intent(in) :: shape
+      integer, intent(in) :: case
+
+      if (.not. allocated(kept%final)) then
+         allocate (kept%final(shape%n_states))
+         allocate (kept%probes(shape%n_states, shape%n_probes))
+         allocate (kept%times(shape%n_rows))
+         allocate (kept%series(shape%n_states, shape%n_rows))
+      end if
+      kept%case = case
+      kept%attempt = 1
+      kept%n_steps = 0
+      kept%n_rhs = 0
+      kept%t_reached = 0.0_wp
+      kept%integration_seconds = 0.0_wp
+      kept%message = ''
+      call make_nan(kept)
+   end subroutine clear
+
+   subroutine make_nan(kept)
+      type(case_result), intent(inout) :: kept
+      real(wp) :: nan
+      nan = ieee_value(0.0_wp, ieee_quiet_nan)
+      kept%final = nan
+      kept%probes = nan
+      kept%times = nan
+      kept%series = nan
+   end subroutine make_nan
+
+   !> Compile, integrate, keep.
+   subroutine integrate(config, sweep, shape, pulse, clock_start, late, kept, error)
+      type(case_config), intent(in) :: config
+      type(sweep_config), intent(in) :: sweep
+      type(case_shape), intent(in) :: shape
+      class(pulse_type), target, intent(inout) :: pulse
+      integer(i8), intent(in) :: clock_start
+      logical, target, intent(inout) :: late
+      type(case_result), target, intent(inout) :: kept
+      type(error_type), allocatable, intent(out) :: error
+      type(scene_type) :: scene
+      type(motion_type), target :: motion
+      type(keeper_type) :: keeper
+      type(case_monitor), target :: monitor
+      type(method_choice) :: choice
+      type(solver_statistics) :: stats
+      class(integrator_type), allocatable :: integrator
+      real(wp), allocatable :: y(:), times(:)
+      integer(i8) :: clock_a, clock_b, clock_rate
+
+      call new_scene(scene, config, error)
+      if (.not. allocated(error)) call new_motion(motion, scene, .false., error)
+      if (allocated(error)) return
+      call initial_state(motion, config%initial, y)
+      call choose_method(choice, config%solver, scene, y(:scene%n_dof), config%t_end)
+      call new_integrator(integrator, motion, choice%method, options_of(config), error)
+      if (allocated(error)) return
+      monitor%pulse => pulse
+      monitor%clock_start = clock_start
+      monitor%limit = sweep%case_seconds
+      monitor%late => late
+      call integrator%set_monitor(monitor)
+      keeper%row = new_run_row(scene%n)
+      keeper%n_rods = shape%n_rods
+      keeper%keep_series = sweep%keep_series
+      keeper%kept => kept
+      call merge_times(config, sweep%probe_times, shape%outputs, times, keeper%probe_of, keeper%output_of)
+
+      call system_clock(clock_a, clock_rate)
+      call simulate(motion, integrator, times, config%t_end, keeper, y, kept%t_reached, error)
+      call system_clock(clock_b)
+      kept%integration_seconds = real(clock_b - clock_a, wp)/real(clock_rate, wp)
+      stats = integrator%statistics()
+      kept%n_steps = stats%n_steps
+      kept%n_rhs = stats%n_rhs
+      call integrator%finalize()
+      if (allocated(error)) return
+      if (.not. all(abs(y) <= huge(y))) then
+         call raise(error, 'the final state is not finite')
+         return
+      end if
+      call fill_row(motion, config%t_end, y, 0.0_wp, keeper%row)
+      call place(keeper%row, keeper%n_rods, kept%final)
+   end subroutine integrate
+
+   !> The times at which states are wanted, in order: probes up to the end of the case, and outputs.
+   subroutine merge_times(config, probe_times, outputs, times, probe_of, output_of)
+      type(case_config), intent(in) :: config
+      real(wp), intent(in) :: probe_times(:) !! increasing
+      logical, intent(in) :: outputs
+      real(wp), allocatable, intent(out) :: times(:)
+      integer, allocatable, intent(out) :: probe_of(:), output_of(:) !! of each time; 0: none
+      real(wp) :: next_probe, next_output
+      integer :: n, p, k, n_probes, n_outputs
+
+      n_probes = count(probe_times <= config%t_end)
+      n_outputs = merge(config%n_outputs + 1, 0, outputs)
+      allocate (times(n_probes + n_outputs))
+      allocate (probe_of(size(times)), output_of(size(times)), source=0)
+      p = 1
+      k = 1
+      n = 0
+      do while (p <= n_probes .or. k <= n_outputs)
+         next_probe = huge(1.0_wp)
+         next_output = huge(1.0_wp)
+         if (p <= n_probes) next_probe = probe_times(p)
+         if (k <= n_outputs) next_output = config%t_end*(real(k - 1, wp)/config%n_outputs)
+         n = n + 1
+         times(n) = min(next_probe, next_output)
+         if (next_probe <= times(n)) then
+            probe_of(n) = p
+            p = p + 1
+         end if
+         if (next_output <= times(n)) then
+            output_of(n) = k
+            k = k + 1
+         end if
+      end do
+      times = times(:n)
+      probe_of = probe_of(:n)
+      output_of = output_of(:n)
+   end subroutine merge_times
+
+   !> Keep the state at a time, if it is to be kept.
+   subroutine observe(self, motion, t, y, error)
+      class(keeper_type), intent(inout) :: self
+      type(motion_type), intent(in) :: motion
+      real(wp), intent(in) :: t
+      real(wp), intent(in) :: y(:)
+      type(error_type), allocatable, intent(out) :: error
+      integer :: probe, output
+
+      self%seen = self%seen + 1
+      probe = self%probe_of(self%seen)
+      output = self%output_of(self%seen)
+      if (.not. all(abs(y) <= huge(y))) then
+         call raise(error, 'the state is not finite')
+         return
+      end if
+      if (probe == 0 .and. .not. self%keep_series) return
+      call fill_row(motion, t, y, 0.0_wp, self%row)
+      if (probe > 0) call place(self%row, self%n_rods, self%kept%probes(:, probe))
+      if (output == 0 .or. .not. self%keep_series) return
+      self%kept%times(output) = t
+      call place(self%row, self%n_rods, self%kept%series(:, output))
+   end subroutine observe
+
+   !> A row in the order of `case_shape`.
+   pure subroutine place(row, n_rods, state)
+      type(run_row), intent(in) :: row
+      integer, intent(in) :: n_rods
+      real(wp), intent(inout) :: state(:) !! (n_states); what the row has not is left as it is
+      integer :: n
+
+      n = size(row%phi)
+      state(1:n) = row%phi
+      state(n_rods + 1:n_rods + n) = row%alpha
+      state(2*n_rods + 1:2*n_rods + n) = row%beta
+      state(3*n_rods + 1:3*n_rods + n) = row%phi_rate
+      state(4*n_rods + 1:4*n_rods + n) = row%alpha_rate
+      state(5*n_rods + 1:5*n_rods + n) = row%beta_rate
+      state(6*n_rods + 1:) = [row%velocity_x, row%velocity_y, row%omega, &
+                              row%displacement_x, row%displacement_y, row%rotation]
+   end subroutine place
+
+   !> Nothing: the sweep has a progress of its own.
+   subroutine report(self, t, n_steps)
+      class(case_monitor), intent(inout) :: self
+      real(wp), intent(in) :: t
+      integer(i8), intent(in) :: n_steps
+      associate (unused => self, unused_t => t, unused_n => n_steps); end associate
+   end subroutine report
+
+   !> Has someone asked the sweep to stop, or has this case used up its wall time?
+   function stop_requested(self) result(requested)
+      class(case_monitor), intent(in) :: self
+      logical :: requested
+      integer(i8) :: now, rate
+
+      call self%pulse%beat(requested)
+      if (requested .or. .not. self%limit > 0.0_wp) return
+      call system_clock(now, rate)
+      requested = real(now - self%clock_start, wp) > self%limit*real(rate, wp)
+      self%late = requested
+   end function stop_requested
+
+   !> A number for a message.
+   pure function short(x) result(text)
+      real(wp), intent(in) :: x
+      character(len=:), allocatable :: text
+      character(len=16) :: digits
+      write (digits, '(g0.6)') x
+      text = trim(adjustl(digits))
+   end function short
+
+end module rodyn_sweep_case

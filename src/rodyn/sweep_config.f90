@@ -1,0 +1,76 @@
+!> One sweep as the user describes it: a base case and the keys that are varied.
+!>
+!> Axes that advance together share a *dimension*; the cases are all combinations of the rows of the dimensions, the
+!> last dimension running fastest. In a grid each axis has its own dimension, unless it goes `along` another; in a zip
+!> all share one.
+module rodyn_sweep_config
+   use rodyn_kinds, only: wp
+   use rodyn_case_config, only: case_config
+   use rodyn_namelist_document, only: namelist_document
+   use rodyn_text, only: quoted, to_text
+   implicit none (type, external)
+   private
+   public :: sweep_config, sweep_axis, key_length, axis_size, value_text, is_ratio
+
+   integer, parameter :: key_length = 80
+
+   !> &axis
+   type :: sweep_axis
+      character(len=key_length) :: key = ''           !! 'group.name(3)' in lower case, or 'mass_ratio'
+      logical :: textual = .false.                    !! `texts`, otherwise `numbers`
+      logical :: whole = .false.                      !! the numbers are integers
+      logical :: bare = .false.                       !! the texts stand without quotes: .true., .false.
+      real(wp), allocatable :: numbers(:)
+      character(len=:), allocatable :: texts(:)
+      character(len=12) :: unit = ''
+      integer :: dimension = 0
+   end type sweep_axis
+
+   !> A whole sweep
+   type :: sweep_config
+      character(len=:), allocatable :: name, text           !! of the sweep file
+      character(len=:), allocatable :: base_name, base_text !! of the case file
+      type(namelist_document) :: base                       !! parsed
+      type(case_config) :: base_case                        !! as the base file alone has it
+      real(wp), allocatable :: probe_times(:)               !! increasing [s]
+      logical :: keep_series = .false.
+      real(wp) :: case_seconds = 0.0_wp                     !! wall time limit; 0: none
+      type(sweep_axis), allocatable :: axes(:)
+      integer :: n_dimensions = 0
+   end type sweep_config
+
+contains
+
+   !> Number of values of an axis.
+   pure integer function axis_size(axis)
+      type(sweep_axis), intent(in) :: axis
+      if (axis%textual) then
+         axis_size = size(axis%texts)
+      else
+         axis_size = size(axis%numbers)
+      end if
+   end function axis_size
+
+   !> Is it the ratio of node mass to rod mass, which no single key of a case holds?
+   pure logical function is_ratio(axis)
+      type(sweep_axis), intent(in) :: axis
+      is_ratio = axis%key == 'mass_ratio'
+   end function is_ratio
+
+   !> Value `row` of an axis in namelist syntax.
+   function value_text(axis, row) result(text)
+      type(sweep_axis), intent(in) :: axis
+      integer, intent(in) :: row
+      character(len=:), allocatable :: text
+      if (axis%bare) then
+         text = trim(axis%texts(row))
+      else if (axis%textual) then
+         text = quoted(trim(axis%texts(row)))
+      else if (axis%whole) then
+         text = to_text(nint(axis%numbers(row)))
+      else
+         text = to_text(axis%numbers(row))
+      end if
+   end function value_text
+
+end module rodyn_sweep_config

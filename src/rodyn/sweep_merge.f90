@@ -1,0 +1,415 @@
+!> From shards to `sweep.h5`, SPEC "Sweep file": written under a temporary name, case after case, and renamed.
+!>
+!> What is in it depends on the sweep alone, not on who computed which case when; only `wall_seconds` differs.
+module rodyn_sweep_merge
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
+   use rodyn_kinds, only: wp, i8
+   use rodyn_build_info, only: compiler, compiler_options, git_commit, program_version
+   use rodyn_case_reader, only: resolved_case
+   use rodyn_errors, only: error_type, raise
+   use rodyn_hdf5_files, only: hdf5_file, hdf5_version
+   use rodyn_integrators, only: sundials_version
+   use rodyn_posix, only: ignore_file_size_signal, parent_directory, path_exists, remove_file, rename_new, sync_path
+   use rodyn_run_layout, only: i_alpha, i_alpha_rate, i_beta, i_beta_rate, i_displacement_x, i_displacement_y, i_omega, &
+      i_phi, i_phi_rate, i_rotation, i_velocity_x, i_velocity_y, run_variables
+   use rodyn_sweep_case, only: case_result, case_shape, status_done
+   use rodyn_sweep_config, only: sweep_config
+   use rodyn_sweep_index, only: sweep_index
+   use rodyn_sweep_plan, only: sweep_plan
+   implicit none (type, external)
+   private
+   public :: merge_sweep
+
+   integer, parameter :: per_rod(6) = [i_phi, i_alpha, i_beta, i_phi_rate, i_alpha_rate, i_beta_rate]
+   integer, parameter :: scalars(6) = [i_velocity_x, i_velocity_y, i_omega, i_displacement_x, i_displacement_y, i_rotation]
+   integer, parameter :: block_bytes = 4*1024*1024 !! memory for the states of a block of cases
+   integer, parameter :: most_block_cases = 4096
+   integer, parameter :: compression = 4
+   integer, parameter :: message_length = 1000
+
+   !> Results of consecutive cases
+   type :: case_block
+      integer :: n = 0
+      real(wp), allocatable :: final(:, :)      !! (state, case)
+      real(wp), allocatable :: probes(:, :, :)  !! (state, probe, case)
+      real(wp), allocatable :: times(:, :)      !! (row, case)
+      real(wp), allocatable :: series(:, :, :)  !! (state, row, case)
+      real(wp), allocatable :: t_reached(:), wall_seconds(:)
+      integer(i8), allocatable :: n_steps(:), n_rhs(:), same_as(:), number(:)
+      character(len=8), allocatable :: status(:)
+      character(len=message_length), allocatable :: message(:)
+   end type case_block
+
+contains
+
+   !> Write the result. All cases that are computed must have a result in the index.
+   subroutine merge_sweep(path, sweep, plan, shape, index, error)
+      character(len=*), intent(in) :: path !! of sweep.h5; no file may have it
+      type(sweep_config), intent(in) :: sweep
+      type(sweep_plan), intent(in) :: plan
+      type(case_shape), intent(in) :: shape
+      type(sweep_index), intent(inout) :: index
+      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable :: ignored
+      type(hdf5_file) :: file
+      character(len=:), allocatable :: failure, temporary
+      logical :: taken
+
+      call ignore_file_size_signal()
+      temporary = path//'.partial'
+      if (path_exists(temporary)) failure = remove_file(temporary) ! left by a killed merge
+      call file%create(temporary, error)
+      if (allocated(error)) return
+      call write_all(file, sweep, plan, shape, index, error)
+      if (.not. allocated(error)) call file%flush(error)
+      if (allocated(error)) then
+         call file%close(ignored)
+      else
+         call file%close(error)
+      end if
+      call index%close()
+      if (.not. allocated(error)) then
+         failure = sync_path(temporary)
+         taken = .false.
+         if (len(failure) == 0) call rename_new(temporary, path, taken, failure)
+         if (len(failure) == 0) failure = sync_path(parent_directory(path))
+         if (len(failure) > 0) call raise(error, path//': cannot be put onto the disk: '//failure)
+      end if
+      if (.not. allocated(error)) return
+      error%message = error%message//'; all results are safe in the shards, run again to merge them'
+      failure = remove_file(temporary)
+   end subroutine merge_sweep
+
+   !> Layout, then blocks of cases, then what coordinates belong to.
+   subroutine write_all(file, sweep, plan, shape, index, error)
+      type(hdf5_file), intent(in) :: file
+      type(sweep_config), intent(in) :: sweep
+      type(sweep_plan), intent(in) :: plan
+      type(case_shape), intent(in) :: shape
+      type(sweep_index), intent(inout) :: index
+      type(error_type), allocatable, intent(out) :: error
+      type(case_block) :: block
+      type(case_result) :: kept
+      integer :: block_cases, first, n
+
+      block_cases = cases_per_block(shape, plan%n_cases)
+      call write_header(file, sweep, plan, error)
+      if (.not. allocated(error)) call write_layout(file, sweep, shape, block_cases, error)
+      if (allocated(error)) return
+      call new_block(block, kept, shape, block_cases)
+      do first = 1, plan%n_cases, block_cases
+         n = min(block_cases, plan%n_cases - first + 1)
+         call fill_block(block, kept, plan, shape, index, first, n, error)
+         if (.not. allocated(error)) call append_block(file, block, shape, error)
+         if (.not. allocated(error)) call append_parameters(file, sweep, plan, first, n, error)
+         if (allocated(error)) return
+      end do
+      call attach_all(file, sweep, shape, error)
+   end subroutine write_all
+
+   !> As many cases as the memory for a block allows.
+   pure integer function cases_per_block(shape, n_cases) result(n)
+      type(case_shape), intent(in) :: shape
+      integer, intent(in) :: n_cases
+      integer :: numbers
+      numbers = shape%n_states*(1 + shape%n_probes + shape%n_rows) + shape%n_rows + 1
+      n = max(1, min(n_cases, most_block_cases, block_bytes/(8*numbers)))
+   end function cases_per_block
+
+   subroutine new_block(block, kept, shape, n)
+      type(case_block), intent(out) :: block
+      type(case_result), intent(out) :: kept
+      type(case_shape), intent(in) :: shape
+      integer, intent(in) :: n
+      allocate (block%final(shape%n_states, n), block%probes(shape%n_states, shape%n_probes, n))
+      allocate (block%times(shape%n_rows, n), block%series(shape%n_states, shape%n_rows, n))
+      allocate (block%t_reached(n), block%wall_seconds(n))
+      allocate (block%n_steps(n), block%n_rhs(n), block%same_as(n), block%number(n))
+      allocate (block%status(n), block%message(n))
+      allocate (kept%final(shape%n_states), kept%probes(shape%n_states, shape%n_probes))
+      allocate (kept%times(shape%n_rows), kept%series(shape%n_states, shape%n_rows))
+   end subroutine new_block
+
+   !> Fetch the results of cases first, first + 1, ...
+   subroutine fill_block(block, kept, plan, shape, index, first, n, error)
+      type(case_block), intent(inout) :: block
+      type(case_result), intent(inout) :: kept
+      type(sweep_plan), intent(in) :: plan
+      type(case_shape), intent(in) :: shape
+      type(sweep_index), intent(inout) :: index
+      integer, intent(in) :: first, n
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: nan
+      integer :: i, source
+
+      nan = ieee_value(0.0_wp, ieee_quiet_nan)
+      block%n = n
+      do i = 1, n
+         source = plan%same_as(first + i - 1)
+         call index%fetch(source, shape, kept, error)
+         if (allocated(error)) return
+         if (kept%status /= status_done) then
+            kept%final = nan
+            kept%probes = nan
+            kept%times = nan
+            kept%series = nan
+         end if
+         block%final(:, i) = kept%final
+         block%probes(:, :, i) = kept%probes
+         block%times(:, i) = kept%times
+         block%series(:, :, i) = kept%series
+         block%t_reached(i) = kept%t_reached
+         block%wall_seconds(i) = kept%wall_seconds
+         block%n_steps(i) = kept%n_steps
+         block%n_rhs(i) = kept%n_rhs
+         block%same_as(i) = source
+         block%number(i) = first + i - 1
+         block%status(i) = merge('done  ', 'failed', kept%status == status_done)
+         block%message(i) = kept%message
+      end do
+   end subroutine fill_block
+
+   !> What the sweep was, and with what it was made. No host and no date: results do not depend on them.
+   subroutine write_header(file, sweep, plan, error)
+      type(hdf5_file), intent(in) :: file
+      type(sweep_config), intent(in) :: sweep
+      type(sweep_plan), intent(in) :: plan
+      type(error_type), allocatable, intent(out) :: error
+
+      call put('title', sweep%base_case%title)
+      call put('program_version', program_version)
+      call put('git_commit', git_commit)
+      call put('compiler', compiler())
+      call put('compiler_options', compiler_options())
+      call put('sundials_version', sundials_version())
+      call put('hdf5_version', hdf5_version())
+      call put('input', sweep%text)
+      call put('base_input', sweep%base_text)
+      call put('resolved_base', resolved_case(sweep%base_case))
+      if (.not. allocated(error)) call file%put_attribute('/', 'n_cases', plan%n_cases, error)
+
+   contains
+
+      subroutine put(name, value)
+         character(len=*), intent(in) :: name, value
+         if (.not. allocated(error)) call file%put_attribute('/', name, value, error)
+      end subroutine put
+
+   end subroutine write_header
+
+   !> All data sets that grow with the cases, empty; coordinates.
+   subroutine write_layout(file, sweep, shape, block_cases, error)
+      type(hdf5_file), intent(in) :: file
+      type(sweep_config), intent(in) :: sweep
+      type(case_shape), intent(in) :: shape
+      integer, intent(in) :: block_cases
+      type(error_type), allocatable, intent(out) :: error
+      integer :: a, i
+
+      call file%write('probe_time', sweep%probe_times, compression, error)
+      call describe('probe_time', 's', 'time at which the state of each case is kept')
+      if (.not. allocated(error)) call file%write('rod', [(i, i=1, shape%n_rods)], compression, error)
+      call describe('rod', '1', 'rod, counted from the spacecraft')
+      if (shape%n_rows > 0) then
+         if (.not. allocated(error)) call file%write('row', [(i - 1, i=1, shape%n_rows)], compression, error)
+         call describe('row', '1', 'output time of a case, counted from its start')
+      end if
+      call make('case', [integer ::], 'integer', '1', 'case; the last axis runs fastest')
+      do a = 1, size(sweep%axes)
+         if (sweep%axes(a)%textual) then
+            call make(parameter_name(a), [integer ::], 'text', '', 'value of '//trim(sweep%axes(a)%key))
+         else
+            call make(parameter_name(a), [integer ::], 'real', unit_or_one(sweep%axes(a)%unit), &
+                      'value of '//trim(sweep%axes(a)%key))
+         end if
+      end do
+      call make('status', [integer ::], 'text', '', 'done or failed')
+      call make('message', [integer ::], 'text', '', 'why the case failed')
+      call make('t_reached', [integer ::], 'real', 's', 'last good time; of a done case its end')
+      call make('n_steps', [integer ::], 'integer', '1', 'internal steps')
+      call make('n_rhs', [integer ::], 'integer', '1', 'right-hand sides')
+      call make('same_as', [integer ::], 'integer', '1', 'first case with the same values, the one that was computed')
+      call make('wall_seconds', [integer ::], 'real', 's', 'wall time of the case')
+      do i = 1, size(per_rod)
+         call make_state(per_rod(i), [shape%n_rods])
+      end do
+      do i = 1, size(scalars)
+         call make_state(scalars(i), [integer ::])
+      end do
+      if (shape%n_rows > 0) call make('series_time', [shape%n_rows], 'real', 's', 'output times; NaN behind the last')
+
+   contains
+
+      !> At the probe times, at the end, and perhaps all along.
+      subroutine make_state(i, row)
+         integer, intent(in) :: i
+         integer, intent(in) :: row(:)
+         associate (variable => run_variables(i))
+            call make(trim(variable%name), [row, shape%n_probes], 'real', trim(variable%units), &
+                      trim(variable%long_name)//', at the probe times')
+            call make('final_'//trim(variable%name), row, 'real', trim(variable%units), &
+                      trim(variable%long_name)//', at the end of the case')
+            if (shape%n_rows > 0) call make('series_'//trim(variable%name), [row, shape%n_rows], 'real', &
+                                            trim(variable%units), trim(variable%long_name))
+         end associate
+      end subroutine make_state
+
+      function parameter_name(a) result(name)
+         integer, intent(in) :: a
+         character(len=:), allocatable :: name
+         name = 'param_'//trim(sweep%axes(a)%key)
+      end function parameter_name
+
+      subroutine make(name, row, kind_of, units, long_name)
+         character(len=*), intent(in) :: name, kind_of, units, long_name
+         integer, intent(in) :: row(:)
+         if (.not. allocated(error)) call file%create_series(name, row, block_cases, compression, error, kind_of)
+         call describe(name, units, long_name)
+      end subroutine make
+
+      subroutine describe(name, units, long_name)
+         character(len=*), intent(in) :: name, units, long_name
+         if (.not. allocated(error) .and. len(units) > 0) call file%put_attribute(name, 'units', units, error)
+         if (.not. allocated(error)) call file%put_attribute(name, 'long_name', long_name, error)
+      end subroutine describe
+
+   end subroutine write_layout
+
+   pure function unit_or_one(unit) result(text)
+      character(len=*), intent(in) :: unit
+      character(len=:), allocatable :: text
+      text = trim(unit)
+      if (len(text) == 0) text = '1'
+   end function unit_or_one
+
+   !> Append the results of a block.
+   subroutine append_block(file, block, shape, error)
+      type(hdf5_file), intent(in) :: file
+      type(case_block), intent(in) :: block
+      type(case_shape), intent(in) :: shape
+      type(error_type), allocatable, intent(out) :: error
+      character(len=:), allocatable :: name
+      real(wp), allocatable :: part_2(:, :), part_3(:, :, :) ! contiguous copies
+      integer :: i, first, last
+
+      associate (n => block%n, rods => shape%n_rods)
+         call file%append('case', block%number(:n), error)
+         if (.not. allocated(error)) call file%append('status', block%status(:n), error)
+         if (.not. allocated(error)) call file%append('message', block%message(:n), error)
+         if (.not. allocated(error)) call file%append('t_reached', block%t_reached(:n), error)
+         if (.not. allocated(error)) call file%append('n_steps', block%n_steps(:n), error)
+         if (.not. allocated(error)) call file%append('n_rhs', block%n_rhs(:n), error)
+         if (.not. allocated(error)) call file%append('same_as', block%same_as(:n), error)
+         if (.not. allocated(error)) call file%append('wall_seconds', block%wall_seconds(:n), error)
+         do i = 1, size(per_rod)
+            first = (i - 1)*rods + 1
+            last = i*rods
+            name = trim(run_variables(per_rod(i))%name)
+            part_3 = block%probes(first:last, :, :n)
+            if (.not. allocated(error)) call file%append(name, part_3, error)
+            part_2 = block%final(first:last, :n)
+            if (.not. allocated(error)) call file%append('final_'//name, part_2, error)
+            if (shape%n_rows == 0) cycle
+            part_3 = block%series(first:last, :, :n)
+            if (.not. allocated(error)) call file%append('series_'//name, part_3, error)
+         end do
+         do i = 1, size(scalars)
+            first = 6*rods + i
+            name = trim(run_variables(scalars(i))%name)
+            part_2 = block%probes(first, :, :n)
+            if (.not. allocated(error)) call file%append(name, part_2, error)
+            if (.not. allocated(error)) call file%append('final_'//name, [block%final(first, :n)], error)
+            if (shape%n_rows == 0) cycle
+            part_2 = block%series(first, :, :n)
+            if (.not. allocated(error)) call file%append('series_'//name, part_2, error)
+         end do
+         if (.not. allocated(error) .and. shape%n_rows > 0) call file%append('series_time', block%times(:, :n), error)
+      end associate
+   end subroutine append_block
+
+   !> The values of the axes in cases first, first + 1, ...
+   subroutine append_parameters(file, sweep, plan, first, n, error)
+      type(hdf5_file), intent(in) :: file
+      type(sweep_config), intent(in) :: sweep
+      type(sweep_plan), intent(in) :: plan
+      integer, intent(in) :: first, n
+      type(error_type), allocatable, intent(out) :: error
+      integer :: rows(size(plan%dimensions), n)
+      real(wp), allocatable :: numbers(:)
+      character(len=:), allocatable :: texts(:)
+      integer :: a, i
+
+      do i = 1, n
+         rows(:, i) = plan%rows(first + i - 1)
+      end do
+      do a = 1, size(sweep%axes)
+         associate (axis => sweep%axes(a))
+            if (axis%textual) then
+               texts = axis%texts(rows(axis%dimension, :))
+               call file%append('param_'//trim(axis%key), texts, error)
+            else
+               numbers = axis%numbers(rows(axis%dimension, :))
+               call file%append('param_'//trim(axis%key), numbers, error)
+            end if
+         end associate
+         if (allocated(error)) return
+      end do
+   end subroutine append_parameters
+
+   !> Dimension scales, as xarray wants them.
+   subroutine attach_all(file, sweep, shape, error)
+      type(hdf5_file), intent(in) :: file
+      type(sweep_config), intent(in) :: sweep
+      type(case_shape), intent(in) :: shape
+      type(error_type), allocatable, intent(out) :: error
+      character(len=*), parameter :: plain(7) = [character(len=12) :: 'status', 'message', 't_reached', 'n_steps', 'n_rhs', &
+                                                 'same_as', 'wall_seconds']
+      integer :: a, i
+
+      call file%make_scale('case', error)
+      if (.not. allocated(error)) call file%make_scale('probe_time', error)
+      if (.not. allocated(error)) call file%make_scale('rod', error)
+      if (.not. allocated(error) .and. shape%n_rows > 0) call file%make_scale('row', error)
+      do i = 1, size(plain)
+         call attach(trim(plain(i)), 1, 'case')
+      end do
+      do a = 1, size(sweep%axes)
+         call attach('param_'//trim(sweep%axes(a)%key), 1, 'case')
+      end do
+      do i = 1, size(per_rod)
+         call attach_state(trim(run_variables(per_rod(i))%name), 1)
+      end do
+      do i = 1, size(scalars)
+         call attach_state(trim(run_variables(scalars(i))%name), 0)
+      end do
+      if (shape%n_rows == 0) return
+      call attach('series_time', 1, 'row')
+      call attach('series_time', 2, 'case')
+
+   contains
+
+      subroutine attach_state(name, before)
+         character(len=*), intent(in) :: name
+         integer, intent(in) :: before !! 1: with a dimension of rods
+         if (before == 1) then
+            call attach(name, 1, 'rod')
+            call attach('final_'//name, 1, 'rod')
+         end if
+         call attach(name, before + 1, 'probe_time')
+         call attach(name, before + 2, 'case')
+         call attach('final_'//name, before + 1, 'case')
+         if (shape%n_rows == 0) return
+         if (before == 1) call attach('series_'//name, 1, 'rod')
+         call attach('series_'//name, before + 1, 'row')
+         call attach('series_'//name, before + 2, 'case')
+      end subroutine attach_state
+
+      subroutine attach(name, dimension, scale)
+         character(len=*), intent(in) :: name, scale
+         integer, intent(in) :: dimension
+         if (.not. allocated(error)) call file%attach_scale(name, dimension, scale, error)
+      end subroutine attach
+
+   end subroutine attach_all
+
+end module rodyn_sweep_merge

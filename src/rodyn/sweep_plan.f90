@@ -1,0 +1,210 @@
+!> From axes to cases: which values case number i has, and which cases are the same.
+!>
+!> Nothing is stored per case, so that a million of them cost nothing. Cases count from 1.
+module rodyn_sweep_plan
+   use rodyn_kinds, only: i8
+   use rodyn_build_info, only: compiler, compiler_options, git_commit, program_version
+   use rodyn_case_config, only: case_config
+   use rodyn_case_reader, only: resolved_case
+   use rodyn_errors, only: error_type, raise, exit_bad_input
+   use rodyn_sweep_config, only: sweep_axis, sweep_config, axis_size, value_text
+   use rodyn_text, only: to_text
+   use rodyn_text_buffer, only: text_buffer
+   implicit none (type, external)
+   private
+   public :: sweep_plan, new_plan, plan_text
+
+   !> Axes that advance together
+   type :: plan_dimension
+      integer :: length = 0
+      integer, allocatable :: first_equal(:) !! the first row with the same values (length)
+   end type plan_dimension
+
+   !> All cases
+   type :: sweep_plan
+      integer :: n_cases = 0
+      type(plan_dimension), allocatable :: dimensions(:)
+   contains
+      procedure :: rows
+      procedure :: same_as
+   end type sweep_plan
+
+   integer(i8), parameter :: most_cases = 100000000_i8
+   character(len=*), parameter :: nl = new_line('a')
+
+contains
+
+   !> The cases of a sweep.
+   subroutine new_plan(plan, sweep, error)
+      type(sweep_plan), intent(out) :: plan
+      type(sweep_config), intent(in) :: sweep
+      type(error_type), allocatable, intent(out) :: error
+      integer(i8) :: n
+      integer :: d
+
+      allocate (plan%dimensions(sweep%n_dimensions))
+      n = 1_i8
+      do d = 1, sweep%n_dimensions
+         call new_dimension(plan%dimensions(d), sweep%axes, d)
+         n = n*plan%dimensions(d)%length
+         if (n > most_cases) then
+            call raise(error, sweep%name//': more than '//to_text(int(most_cases))//' cases', exit_bad_input)
+            return
+         end if
+      end do
+      plan%n_cases = int(n)
+   end subroutine new_plan
+
+   !> Length and equal rows of one dimension.
+   subroutine new_dimension(dimension, axes, d)
+      type(plan_dimension), intent(inout) :: dimension
+      type(sweep_axis), intent(in) :: axes(:)
+      integer, intent(in) :: d
+      integer, allocatable :: order(:)
+      integer :: i
+
+      do i = 1, size(axes)
+         if (axes(i)%dimension == d) dimension%length = axis_size(axes(i))
+      end do
+      order = [(i, i=1, dimension%length)]
+      call sort_rows(order, axes, d)
+      allocate (dimension%first_equal(dimension%length))
+      do i = 1, dimension%length
+         dimension%first_equal(order(i)) = order(i)
+         if (i == 1) cycle
+         if (compare(axes, d, order(i - 1), order(i)) == 0) &
+            dimension%first_equal(order(i)) = dimension%first_equal(order(i - 1))
+      end do
+   end subroutine new_dimension
+
+   !> Order rows by their values, equal ones by number: merge sort.
+   recursive subroutine sort_rows(order, axes, d)
+      integer, intent(inout) :: order(:)
+      type(sweep_axis), intent(in) :: axes(:)
+      integer, intent(in) :: d
+      integer, allocatable :: left(:), right(:)
+      integer :: half, i, j, k
+
+      if (size(order) < 2) return
+      half = size(order)/2
+      left = order(:half)
+      right = order(half + 1:)
+      call sort_rows(left, axes, d)
+      call sort_rows(right, axes, d)
+      i = 1
+      j = 1
+      do k = 1, size(order)
+         if (j > size(right)) then
+            order(k) = left(i)
+            i = i + 1
+         else if (i > size(left)) then
+            order(k) = right(j)
+            j = j + 1
+         else if (compare(axes, d, left(i), right(j)) <= 0) then
+            order(k) = left(i)
+            i = i + 1
+         else
+            order(k) = right(j)
+            j = j + 1
+         end if
+      end do
+   end subroutine sort_rows
+
+   !> -1, 0 or 1: order of the values of two rows.
+   pure integer function compare(axes, d, row, other)
+      type(sweep_axis), intent(in) :: axes(:)
+      integer, intent(in) :: d, row, other
+      integer :: i
+
+      compare = 0
+      do i = 1, size(axes)
+         if (axes(i)%dimension /= d) cycle
+         if (axes(i)%textual) then
+            if (axes(i)%texts(row) < axes(i)%texts(other)) compare = -1
+            if (axes(i)%texts(row) > axes(i)%texts(other)) compare = 1
+         else
+            if (axes(i)%numbers(row) < axes(i)%numbers(other)) compare = -1
+            if (axes(i)%numbers(row) > axes(i)%numbers(other)) compare = 1
+         end if
+         if (compare /= 0) return
+      end do
+   end function compare
+
+   !> Row of each dimension in a case; the last dimension runs fastest.
+   pure function rows(self, case) result(at)
+      class(sweep_plan), intent(in) :: self
+      integer, intent(in) :: case !! 1..n_cases
+      integer :: at(size(self%dimensions))
+      integer :: d, rest
+
+      rest = case - 1
+      do d = size(self%dimensions), 1, -1
+         at(d) = 1 + modulo(rest, self%dimensions(d)%length)
+         rest = rest/self%dimensions(d)%length
+      end do
+   end function rows
+
+   !> The first case with the same values: the one that is computed.
+   pure integer function same_as(self, case)
+      class(sweep_plan), intent(in) :: self
+      integer, intent(in) :: case !! 1..n_cases
+      integer :: at(size(self%dimensions))
+      integer :: d
+
+      at = self%rows(case)
+      same_as = 0
+      do d = 1, size(at)
+         same_as = same_as*self%dimensions(d)%length + self%dimensions(d)%first_equal(at(d)) - 1
+      end do
+      same_as = same_as + 1
+   end function same_as
+
+   !> All that results depend on, one line each: what a resumed sweep must have in common with the first.
+   !> (The wall limit is not there: --retry-failed may give cases more time.)
+   function plan_text(sweep) result(text)
+      type(sweep_config), intent(in) :: sweep
+      character(len=:), allocatable :: text
+      type(text_buffer) :: buffer
+      type(case_config) :: base
+      integer :: a, i
+
+      call buffer%line('format: 1')
+      call buffer%line('program: '//program_version//' ('//git_commit//')')
+      call buffer%line('compiler: '//compiler()//', '//compiler_options())
+      do i = 1, size(sweep%probe_times)
+         call buffer%line('probe time: '//to_text(sweep%probe_times(i)))
+      end do
+      call buffer%line('keep_series: '//to_text(sweep%keep_series))
+      do a = 1, size(sweep%axes)
+         associate (axis => sweep%axes(a))
+            do i = 1, axis_size(axis)
+               call buffer%line('axis '//to_text(a)//' (dimension '//to_text(axis%dimension)//') '//trim(axis%key)// &
+                                ' = '//value_text(axis, i))
+            end do
+         end associate
+      end do
+      base = sweep%base_case
+      base%title = '' ! the results do not depend on it, nor on where a single run would be written
+      base%output%file = ''
+      base%output%ledger = .false.
+      base%output%compression = 0
+      call append_lines(buffer, 'base: ', resolved_case(base))
+      text = buffer%content()
+   end function plan_text
+
+   !> Every line of `text`, with a mark in front.
+   subroutine append_lines(buffer, mark, text)
+      type(text_buffer), intent(inout) :: buffer
+      character(len=*), intent(in) :: mark, text
+      integer :: first, length
+
+      first = 1
+      do while (first <= len(text))
+         length = index(text(first:), nl) - 1
+         if (length < 0) length = len(text) - first + 1
+         call buffer%line(mark//text(first:first + length - 1))
+         first = first + length + 1
+      end do
+   end subroutine append_lines
+
+end module rodyn_sweep_plan

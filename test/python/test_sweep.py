@@ -1,0 +1,354 @@
+"""rodyn sweep: what is in sweep.h5, and that nothing is lost, doubled or overwritten.
+
+RODYN=path  the program under test; otherwise bin/rodyn.
+"""
+
+import math
+import os
+import pathlib
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+import xarray
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+RODYN = os.environ.get("RODYN", str(ROOT / "bin" / "rodyn"))
+sys.path.insert(0, str(ROOT / "bench" / "sweeps"))
+from campaign import content  # noqa: E402
+
+BASE = """
+&case t_end = 0.05, n_outputs = 5 /
+&spacecraft mass = 122.5, inertia = 10, hinge_x = 0.35, hinge_y = 0.35 /
+&chain n_rods = 3, length = 1.5, 1.0, 2.0, mass_per_length = 0.509, bending_stiffness = 1.374e4, node_mass = 0.5,
+       hinge_stiffness = 5000, hinge_damping = 0.01 /
+&load component = 'M', t_end = 1, value = 1000 /
+&load component = 'X', t_end = 1, value = 10 /
+&solver rtol = 1e-6, atol = 1e-8 /
+"""
+GRID = """&sweep base = 'base.nml', probe_times = 0.02, 0.05 /
+&axis key = 'mass_ratio', values = 2, 4, 8 /
+&axis key = 'model.inertia', text_values = 'distributed', 'lumped' /
+"""
+
+
+@pytest.fixture
+def here(tmp_path) -> pathlib.Path:
+    (tmp_path / "base.nml").write_text(BASE)
+    return tmp_path
+
+
+def sweep(here: pathlib.Path, text: str | None, *options: str, name: str = "s", code: int = 0):
+    if text is not None:
+        (here / f"{name}.nml").write_text(text)
+    result = subprocess.run([RODYN, "sweep", f"{name}.nml", *options], cwd=here, capture_output=True, text=True)
+    assert result.returncode == code, result.stdout + result.stderr
+    return result
+
+
+def opened(here: pathlib.Path, name: str = "s") -> xarray.Dataset:
+    with xarray.open_dataset(here / name / "sweep.h5") as data:
+        return data.load()
+
+
+def single(here: pathlib.Path, *changes: tuple[str, str]) -> xarray.Dataset:
+    """One run of the base with changes."""
+    text = BASE
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    (here / "one.nml").write_text(text)
+    subprocess.run([RODYN, "run", "one.nml", "--force", "--quiet"], cwd=here, check=True)
+    with xarray.open_dataset(here / "one.h5") as data:
+        return data.load()
+
+
+def test_a_grid_is_the_same_as_single_runs(here):
+    sweep(here, GRID)
+    data = opened(here)
+    assert dict(data.sizes) == {"case": 6, "probe_time": 2, "rod": 3}
+    assert list(data.param_mass_ratio) == [2, 2, 4, 4, 8, 8]
+    assert list(data["param_model.inertia"]) == ["distributed", "lumped"] * 3
+    assert set(data.status.values) == {"done"}
+    node = 4 * (4.5 * 0.509) / 3
+    for case, model in ((2, ""), (3, "&model inertia = 'lumped', bending = 'quasistatic' /")):
+        run = single(here, ("node_mass = 0.5", f"node_mass = {node!r}"), ("&solver", model + "&solver"))
+        for name in ("phi", "alpha", "beta_rate", "omega", "rotation", "displacement_x"):
+            expected = run[name].sel(time=[0.02, 0.05], method="nearest")
+            # the mass in the file differs by rounding, and so may the steps
+            np.testing.assert_allclose(data[name][case], expected, rtol=0, atol=1e-6 * float(np.abs(run[name]).max() + 1))
+        np.testing.assert_array_equal(data.final_phi[case], data.phi[case, -1])
+
+
+def test_every_variable_has_unit_and_meaning(here):
+    sweep(here, GRID)
+    data = opened(here)
+    for name, variable in data.variables.items():
+        assert "long_name" in variable.attrs, name
+        assert "units" in variable.attrs or variable.dtype.kind in "OUT", name
+
+
+def test_zip_takes_first_with_first(here):
+    sweep(here, """&sweep base = 'base.nml', combine = 'zip' /
+        &axis key = 'chain.hinge_stiffness(0)', start = 1000, stop = 4000, count = 3, spacing = 'log' /
+        &axis key = 'load(2).value', values = 1, 2, 3 /""")
+    data = opened(here)
+    np.testing.assert_allclose(data["param_chain.hinge_stiffness(0)"], [1000, 2000, 4000], rtol=1e-15)
+    assert list(data["param_load(2).value"]) == [1, 2, 3]
+    assert data["param_chain.hinge_stiffness(0)"].units == "N m/rad"
+
+
+def test_an_axis_along_another_stays_with_it_in_a_grid(here):
+    sweep(here, """&sweep base = 'base.nml' /
+        &axis key = 'solver.rtol', values = 1e-5, 1e-7 /
+        &axis key = 'model.gauss_points', values = 3, 4, 5 /
+        &axis key = 'solver.atol', values = 1e-7, 1e-9, along = 'solver.rtol' /""")
+    data = opened(here)
+    assert data.sizes["case"] == 6
+    np.testing.assert_allclose(data["param_solver.atol"] / data["param_solver.rtol"], 0.01)
+
+
+def test_equal_cases_run_once(here):
+    result = sweep(here, """&sweep base = 'base.nml' /
+        &axis key = 'mass_ratio', values = 2, 3, 2 /
+        &axis key = 'case.n_outputs', start = 1, stop = 3, count = 5 /""")
+    assert "15 cases, 6 to compute" in result.stdout
+    data = opened(here)
+    assert list(data.same_as) == [1, 2, 2, 4, 4, 6, 7, 7, 9, 9, 1, 2, 2, 4, 4]
+    np.testing.assert_array_equal(data.phi[0], data.phi[10])
+
+
+def test_output_steps_do_not_change_the_integration(here):
+    sweep(here, "&sweep base = 'base.nml' /\n&axis key = 'case.n_outputs', values = 1, 10, 1000 /")
+    data = opened(here)
+    assert list(data.same_as) == [1, 2, 3]
+    assert len(np.unique(data.n_steps)) == 1 and len(np.unique(data.phi[:, 0, 2])) == 1
+
+
+def test_series_are_kept_on_request(here):
+    sweep(here, """&sweep base = 'base.nml', keep_series = .true., probe_times = 0.03 /
+        &axis key = 'case.n_outputs', values = 5, 3 /""")
+    data = opened(here)
+    assert data.series_phi.shape == (2, 6, 3)
+    np.testing.assert_allclose(data.series_time[0], np.linspace(0, 0.05, 6), atol=1e-17)
+    assert list(np.isnan(data.series_time[1])) == [False] * 4 + [True] * 2
+    run = single(here)
+    np.testing.assert_array_equal(data.series_phi[0], run.phi)
+    np.testing.assert_array_equal(data.final_phi[0], run.phi[-1])
+
+
+def test_chains_of_different_length_fit_in_one_file(here):
+    text = BASE.replace("length = 1.5, 1.0, 2.0", "length = 1.5")
+    (here / "base.nml").write_text(text)
+    sweep(here, "&sweep base = 'base.nml' /\n&axis key = 'chain.n_rods', values = 2, 4 /")
+    data = opened(here)
+    assert list(np.isnan(data.phi[0, 0])) == [False, False, True, True] and not np.isnan(data.phi[1]).any()
+
+
+def test_probes_behind_the_end_are_nan(here):
+    sweep(here, "&sweep base = 'base.nml', probe_times = 0.02, 0.05 /\n&axis key = 'case.t_end', values = 0.03, 0.05 /")
+    data = opened(here)
+    assert list(data.status) == ["done", "done"] and list(np.isnan(data.omega[0])) == [False, True]
+    np.testing.assert_array_equal(data.omega[0, 0], data.omega[1, 0])
+    assert list(data.t_reached) == [0.03, 0.05]
+
+
+def test_a_failed_case_is_nan_and_alone(here):
+    axis = "&axis key = 'solver.max_steps', values = 1000000, {} /\n&axis key = 'mass_ratio', values = 2, 4 /"
+    result = sweep(here, "&sweep base = 'base.nml' /\n" + axis.format(20), code=1)
+    assert "case 3 failed: max_steps = 20 reached" in result.stderr and "2 done, 2 failed" in result.stdout
+    data = opened(here)
+    assert list(data.status) == ["done", "done", "failed", "failed"]
+    assert np.isnan(data.phi[2:]).all() and np.isnan(data.final_omega[2:]).all()
+    assert "max_steps" in str(data.message.values[2]) and 0 < data.t_reached[2] < 0.05
+    sweep(here, "&sweep base = 'base.nml' /\n" + axis.format(1000001), name="good")
+    np.testing.assert_array_equal(data.phi[:2], opened(here, "good").phi[:2])
+    again = sweep(here, None, code=1)
+    assert "nothing to compute" in again.stdout
+    retried = sweep(here, None, "--retry-failed", code=1)
+    assert "2 of them on the disk" in retried.stdout
+    assert (here / "s" / "sweep-1.h5").exists()
+
+
+def test_a_case_over_its_wall_limit_fails_alone_and_can_be_retried(here):
+    text = "&sweep base = 'base.nml', probe_times = 0.05, case_seconds = {} /\n&axis key = 'case.t_end', values = 0.05, 400 /"
+    sweep(here, text.format(0.3), code=1)
+    data = opened(here)
+    assert list(data.status) == ["done", "failed"] and "case_seconds" in str(data.message.values[1])
+    assert 0.05 < data.t_reached[1] < 400
+    sweep(here, text.format(100), "--retry-failed")
+    data = opened(here)
+    assert list(data.status) == ["done", "done"]
+    np.testing.assert_allclose(data.phi[0, 0], data.phi[1, 0], rtol=0, atol=1e-6)  # the last step ends at t_end
+
+
+def test_running_again_computes_nothing(here):
+    sweep(here, GRID)
+    before = (here / "s" / "sweep.h5").read_bytes()
+    assert "nothing to compute" in sweep(here, None).stdout
+    assert (here / "s" / "sweep.h5").read_bytes() == before
+
+
+def test_a_lost_result_is_merged_again(here):
+    sweep(here, GRID)
+    wanted = content(here / "s")
+    (here / "s" / "sweep.h5").unlink()
+    sweep(here, None)
+    assert content(here / "s") == wanted
+
+
+def test_a_changed_sweep_is_refused_with_the_difference(here):
+    sweep(here, GRID)
+    before = (here / "s" / "sweep.h5").read_bytes()
+    result = sweep(here, GRID.replace("2, 4, 8", "2, 4, 16"), code=2)
+    assert "now:   axis 1 (dimension 1) mass_ratio = 1.6" in result.stderr and "--force" in result.stderr
+    (here / "s.nml").write_text(GRID)
+    (here / "base.nml").write_text(BASE.replace("= 1000 /", "= 1001 /"))
+    assert "1.0010000000000000E+003" in sweep(here, None, code=2).stderr
+    (here / "base.nml").write_text(BASE + "! a remark\n")
+    sweep(here, None)
+    plan = here / "s" / "plan.txt"
+    plan.write_text(plan.read_text().replace("program: ", "program: 9.9 "))
+    assert "there:  program: 9.9" in sweep(here, None, code=2).stderr.replace("there: ", "there:  ").replace("   ", "  ")
+    assert (here / "s" / "sweep.h5").read_bytes() == before
+    sweep(here, GRID.replace("2, 4, 8", "2, 4, 16"), "--force")
+    assert opened(here).param_mass_ratio[-1] == 16
+
+
+def test_shards_give_the_same_bytes(here):
+    sweep(here, GRID, name="one")
+    for i in (3, 1, 2):
+        sweep(here, GRID, "--shard", f"{i}/3", name="s")
+        assert (here / "s" / "sweep.h5").exists() == (i == 2)
+    sweep(here, GRID, "--shard", "1/2", name="mixed")
+    sweep(here, None, name="mixed")
+    one = content(here / "one")
+    assert content(here / "s") == one and content(here / "mixed") == one
+    for bad in ("0/3", "4/3", "x", "1", "1/", "-1/2", "1/2/3"):
+        sweep(here, None, "--shard", bad, code=2)
+
+
+@pytest.mark.skipif(shutil.which("mpirun") is None, reason="no mpirun")
+def test_two_ranks_give_the_same_bytes(here):
+    sweep(here, GRID, name="one")
+    (here / "s.nml").write_text(GRID)
+    root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    mpi = ["mpirun", "--oversubscribe", "-n", "2", RODYN, "sweep"]
+    result = subprocess.run([*mpi, "s.nml"], cwd=here, capture_output=True, text=True, env=os.environ | root)
+    assert result.returncode == 0 and "2 ranks of MPI" in result.stdout, result.stdout + result.stderr
+    assert content(here / "s") == content(here / "one")
+    failed = subprocess.run([*mpi, "none.nml"], cwd=here, capture_output=True, text=True, env=os.environ | root)
+    assert failed.returncode == 2 and failed.stderr.count("none.nml: cannot be read") == 1
+
+
+LONG = "&sweep base = 'base.nml' /\n&axis key = 'case.t_end', start = 4, stop = 5, count = 100 /"
+
+
+def start(here: pathlib.Path, *options: str) -> subprocess.Popen[str]:
+    (here / "s.nml").write_text(LONG)
+    process = subprocess.Popen([RODYN, "sweep", "s.nml", "--quiet", *options], cwd=here, stderr=subprocess.PIPE, text=True)
+    for _ in range(1000):
+        if list(here.glob("s/shards/*.shard")) or process.poll() is not None:
+            return process
+        time.sleep(0.01)
+    raise AssertionError("no shard after 10 s")
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGUSR1])
+def test_a_signal_stops_at_a_case_and_is_resumed(here, number):
+    process = start(here)
+    process.send_signal(number)
+    begin = time.monotonic()
+    _, errors = process.communicate()
+    assert process.returncode == 75 and time.monotonic() - begin < 5
+    assert number.name in errors and "resume" in errors
+    assert "state = stopped" in (here / "s" / "status.txt").read_text()
+    assert "of them on the disk" in sweep(here, None).stdout
+    sweep(here, LONG, name="whole")
+    assert content(here / "s") == content(here / "whole")
+
+
+def test_two_processes_never_work_on_one_sweep(here):
+    process = start(here)
+    for options in ((), ("--shard", "1/2"), ("--force",)):
+        assert "works on this sweep" in sweep(here, None, *options, code=2).stderr
+    process.kill()
+    process.communicate()
+    shards = set(here.glob("s/shards/*.shard"))
+    sweep(here, None)
+    assert shards and (here / "s" / "sweep.h5").exists()
+
+
+def test_damage_is_noticed_and_redone(here):
+    sweep(here, GRID)
+    wanted = content(here / "s")
+    shard = next(here.glob("s/shards/*.shard"))
+    data = bytearray(shard.read_bytes())
+    data[len(data) // 2] ^= 4
+    shard.write_bytes(data)
+    result = sweep(here, None)
+    assert "checksum wrong; set aside" in result.stderr and content(here / "s") == wanted
+    assert list(here.glob("s/shards/*.damaged")) and (here / "s" / "sweep-1.h5").exists()
+    next(here.glob("s/shards/*.shard")).unlink()
+    result = sweep(here, None)
+    assert "sealed, but not there" in result.stderr and content(here / "s") == wanted
+    assert sweep(here, None).stderr == ""
+
+
+def test_dry_run_writes_nothing(here):
+    result = sweep(here, GRID, "--dry-run")
+    assert len([line for line in result.stdout.splitlines() if "'lumped'" in line]) == 3
+    assert "time    about 0:00:0" in result.stdout and "MB of sweep.h5" in result.stdout
+    assert not (here / "s").exists()
+
+
+def test_defaults_are_a_valid_sweep(here):
+    text = subprocess.run([RODYN, "defaults", "sweep"], capture_output=True, text=True, check=True).stdout
+    sweep(here, text)
+    assert opened(here).sizes["case"] == 3
+
+
+@pytest.mark.parametrize(("text", "message"), [
+    ("&sweep base = 'base.nml' /", "&axis: at least one is required"),
+    ("&sweep bas = 'x' /\n&axis key = 'mass_ratio', values = 1 /", "the nearest known one is base"),
+    ("&sweep base = 'none.nml' /\n&axis key = 'mass_ratio', values = 1 /", "none.nml: cannot be read"),
+    ("&sweep base = 'base.nml' /\n&axis key = 'chain.lenght', values = 1 /", "the nearest one is length"),
+    ("&sweep base = 'base.nml' /\n&axis key = 'chian.length', values = 1 /", "the nearest one is chain"),
+    ("&sweep base = 'base.nml' /\n&axis key = 'mass_ratio', values = 0 /", "must be positive"),
+    ("&sweep base = 'base.nml' /\n&axis key = 'solver.method', text_values = 'rk4' /", "must be 'auto'"),
+    ("&sweep base = 'base.nml' /\n&axis key = 'solver.method', values = 1 /", "takes text_values"),
+    ("&sweep base = 'base.nml' /\n&axis key = 'case.n_outputs', values = 1.5 /", "must be a whole number"),
+    ("&sweep base = 'base.nml' /\n&axis key = 'case.t_end', values = 1, -1 /", "value 2 (-1.0"),
+    ("&sweep base = 'base.nml' /\n&axis key = 'load.value', values = 1 /", "load(1).value"),
+    ("&sweep base = 'base.nml' /\n&axis key = 'output.file', text_values = 'x' /", "has no influence"),
+    ("&sweep base = 'base.nml' /\n&axis key = 'case.t_end', start = 0, stop = 1, count = 3, spacing = 'log' /", "positive start"),
+    ("&sweep base = 'base.nml', combine = 'zip' /\n&axis key = 'case.t_end', values = 1, 2 /\n"
+     "&axis key = 'solver.rtol', values = 0.1 /", "has 1 values, but case.t_end"),
+    ("&sweep base = 'base.nml', probe_times = 2, 1 /\n&axis key = 'mass_ratio', values = 1 /", "must increase"),
+])
+def test_faults_are_told_with_their_line(here, text, message):
+    result = sweep(here, text, code=2)
+    assert message in result.stderr
+    check = subprocess.run([RODYN, "check", "s.nml"], cwd=here, capture_output=True, text=True)
+    assert check.returncode == 2 and message in check.stderr
+    assert not (here / "s").exists()
+
+
+def test_shipped_sweeps_are_valid():
+    files = sorted((ROOT / "cases").glob("sweep_*.nml")) + sorted((ROOT / "bench" / "sweeps").glob("*0*.nml"))
+    assert len(files) >= 7
+    for file in files:
+        subprocess.run([RODYN, "check", str(file)], check=True, capture_output=True)
+
+
+def test_exact_and_lumped_approach_each_other(tmp_path):
+    subprocess.run([RODYN, "sweep", str(ROOT / "cases" / "sweep_table3.nml"), "--output", str(tmp_path / "t")], check=True,
+                   capture_output=True)
+    with xarray.open_dataset(tmp_path / "t" / "sweep.h5") as data:
+        phi = data.phi.values[:, 0]
+    difference = np.abs(phi[0::2] - phi[1::2]).max(axis=1)
+    assert difference[-1] < 0.3 * difference[0] and math.isfinite(difference.sum())
