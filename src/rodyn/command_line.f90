@@ -5,6 +5,7 @@ module rodyn_command_line
    use rodyn_case_config, only: case_config
    use rodyn_case_reader, only: read_case, default_case
    use rodyn_file_text, only: read_text_file
+   use rodyn_posix_files, only: watch_signals
    use rodyn_run, only: run_case
    use rodyn_posix, only: same_path, write_output
    use rodyn_sweep_config, only: sweep_config
@@ -95,6 +96,7 @@ contains
          call raise(error, path//': is the case itself; give the result another name by --output', exit_bad_input)
          return
       end if
+      call watch_signals()
       call run_case(config, path, error, input_text=text, force=options%force, quiet=options%quiet)
    end subroutine run_file_command
 
@@ -289,7 +291,8 @@ contains
                 '  --output FILE.h5   name of the result'//nl// &
                 '  --force            replace an existing result'//nl// &
                 '  --quiet            print nothing but errors'//nl// &
-                'Exit codes: 0 done, 1 the run failed (the file holds all rows until then), 2 bad input.'
+                'Exit codes: 0 done, 1 the run failed (the file holds all rows until then), 2 bad input,'//nl// &
+                '75 stopped by SIGTERM, SIGUSR1 or SIGINT (rows until then in FILE.h5.stopped; run again).'
       case ('sweep')
          text = 'rodyn sweep SWEEP.nml [--output DIR] [--shard I/N] [--dry-run] [--retry-failed] [--force] [--quiet]'//nl// &
                 '  Compute many variants of a case; the result is DIR/sweep.h5 (default: SWEEP in the working directory).'//nl// &

@@ -3,12 +3,13 @@ module rodyn_progress
    use, intrinsic :: iso_fortran_env, only: error_unit
    use, intrinsic :: iso_c_binding, only: c_int
    use rodyn_kinds, only: wp, i8
+   use rodyn_posix_files, only: stop_signal
    use rodyn_integrator, only: monitor_type, time_text
    implicit none (type, external)
    private
    public :: progress_monitor, new_progress, progress_line, duration_text, is_terminal
 
-   !> Prints while a run goes on; see `new_progress`. Extend it to answer `stop_requested`.
+   !> Prints while a run goes on, and stops it after a signal; see `new_progress`.
    type, extends(monitor_type) :: progress_monitor
       real(wp) :: t_start = 0.0_wp, t_end = 1.0_wp !! the whole run [s]
       logical :: quiet = .false.
@@ -20,6 +21,7 @@ module rodyn_progress
    contains
       procedure :: report
       procedure :: finish
+      procedure :: stop_requested => signal_came
    end type progress_monitor
 
    real(wp), parameter :: terminal_interval = 0.2_wp !! wall time between lines [s]
@@ -79,6 +81,14 @@ contains
       end if
       flush (self%unit)
    end subroutine report
+
+   !> True after a signal that the program watches.
+   function signal_came(self) result(requested)
+      class(progress_monitor), intent(in) :: self
+      logical :: requested
+      associate (unused => self); end associate
+      requested = len(stop_signal()) > 0
+   end function signal_came
 
    !> Wipe the line from a terminal, so that what follows starts at the margin.
    subroutine finish(self)

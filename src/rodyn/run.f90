@@ -36,7 +36,8 @@ module rodyn_run
 contains
 
    !> Run a case and write its file. On failure of the integration the file holds all rows until then, with
-   !> status 'failed'; on refused input nothing is written.
+   !> status 'failed'; on refused input nothing is written. A run that is asked to stop (see `watch_signals`) leaves
+   !> its rows in `path`.stopped, so that the same call can be made again.
    subroutine run_case(config, path, error, input_text, force, quiet)
       type(case_config), intent(in) :: config
       character(len=*), intent(in) :: path                 !! of the HDF5 file
@@ -53,6 +54,7 @@ contains
       type(progress_monitor), target :: progress
       real(wp), allocatable :: y(:)
       type(error_type), allocatable :: failure
+      character(len=:), allocatable :: written
       logical :: silent, replace
       integer(i8) :: clock_start, clock_end, clock_rate
       real(wp) :: t
@@ -97,14 +99,20 @@ contains
                     config%t_end, recorder, y, t, failure)
       call progress%finish()
       call system_clock(clock_end)
+      written = path
+      if (allocated(failure)) then
+         if (failure%exit_code == exit_stopped) written = path//'.stopped'
+      end if
+      if (written /= path) call recorder%file%redirect(written)
       call close_file(recorder%file, integrator, choice, config, scene, failure, &
                       real(clock_end - clock_start, wp)/real(clock_rate, wp), error)
       if (.not. silent .and. .not. allocated(error)) &
-         call print_result(integrator, recorder, path, config, t, real(clock_end - clock_start, wp)/real(clock_rate, wp), failure)
+         call print_result(integrator, recorder, written, config, t, &
+                           real(clock_end - clock_start, wp)/real(clock_rate, wp), failure)
       call integrator%finalize()
       if (allocated(error)) return
       if (allocated(failure)) then
-         failure%message = failure%message//' (rows until then are in '//path//')'
+         failure%message = failure%message//' (rows until then are in '//written//')'
          call move_alloc(failure, error)
       end if
    end subroutine run_case

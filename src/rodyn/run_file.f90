@@ -108,6 +108,7 @@ module rodyn_run_file
       procedure :: append
       procedure :: finish
       procedure :: discard
+      procedure :: redirect
       procedure, private :: write_layout
       procedure, private :: write_header
       procedure, private :: write_solver_report
@@ -125,6 +126,15 @@ contains
       allocate (row%phi(n_rods), row%alpha(n_rods), row%beta(n_rods), source=0.0_wp)
       allocate (row%phi_rate(n_rods), row%alpha_rate(n_rods), row%beta_rate(n_rods), source=0.0_wp)
    end function new_run_row
+
+   !> Let the finished file have another name, replacing what has it: the rows of a stopped run do not take the
+   !> place of its result.
+   subroutine redirect(self, path)
+      class(run_file), intent(inout) :: self
+      character(len=*), intent(in) :: path
+      self%path = path
+      self%force = .true.
+   end subroutine redirect
 
    !> Refuse a path at which no result can or may appear. Nothing is written.
    subroutine check_output_path(path, force, error)

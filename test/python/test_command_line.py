@@ -6,7 +6,9 @@ RODYN=path  the program under test; otherwise bin/rodyn.
 import os
 import pathlib
 import re
+import signal
 import subprocess
+import time
 
 import h5py
 import numpy as np
@@ -579,3 +581,26 @@ def test_a_run_with_a_ledger_makes_the_same_steps_as_one_without(tmp_path):
         with h5py.File(with_ledger) as first, h5py.File(without) as second:
             for name in (*ROD_STATES, *SCALAR_STATES):
                 assert first[name][:].tobytes() == second[name][:].tobytes(), (method, name)
+
+
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGUSR1", "SIGINT"])
+def test_a_signal_stops_a_run_that_can_be_made_again(tmp_path: pathlib.Path, name: str) -> None:
+    """Exit 75, rows until then beside the place of the result, and the same command works again."""
+    case = tmp_path / "long.nml"
+    text = (ROOT / "cases" / "table1.nml").read_text()
+    case.write_text(text.replace("t_end = 30 ", "t_end = 10000 "))
+    command = [str(RODYN), "run", str(case), "--output", str(tmp_path / "long.h5")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        time.sleep(1.5)
+        process.send_signal(getattr(signal, name))
+        start = time.monotonic()
+        errors = process.communicate(timeout=30)[1]
+    assert process.returncode == 75, errors
+    assert time.monotonic() - start < 5.0
+    assert "stopped" in errors
+    assert [path.name for path in tmp_path.glob("long.h5*")] == ["long.h5.stopped"]
+    with h5py.File(tmp_path / "long.h5.stopped") as rows:
+        assert rows.attrs["status"] == b"stopped"
+        assert rows["time"].size > 0
+    case.write_text(text.replace("t_end = 30 ", "t_end = 0.1 "))
+    assert subprocess.run(command, capture_output=True, check=False).returncode == 0
