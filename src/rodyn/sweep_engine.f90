@@ -177,7 +177,7 @@ contains
       type(notice_list) :: notices
       character(len=:), allocatable :: path
       character(len=16) :: number
-      integer(i8) :: fault
+      integer(i8) :: fault, ignored, number_of_shard
 
       fault = exit_done
       if (engine%ranks%rank == 0) then
@@ -206,9 +206,17 @@ contains
          write (number, '(a, i6.6)') 'r', engine%ranks%rank
          engine%tag = trim(number)
          call engine%directory%lock_rank(path, engine%ranks%rank, error)
-         index%directory = path
+         if (allocated(error)) then ! the other ranks must hear of it, or they would wait for this one
+            write (error_unit, '(a)') error%message
+            ignored = engine%ranks%add(at_errors, 1)
+            deallocate (error)
+            engine%todo = engine%todo(:0)
+         end if
+      else
+         number_of_shard = index%next_number(engine%tag)
       end if
-      engine%next_number = index%next_number(engine%tag)
+      call engine%ranks%share_word(number_of_shard) ! one rank reads the directory, not all
+      engine%next_number = int(number_of_shard)
    end subroutine open_sweep
 
    !> 's0003-of-0016'

@@ -156,7 +156,7 @@ contains
       end do
    end subroutine take
 
-   !> The first number that no shard of a tag has had.
+   !> The first number that no shard of a tag has had; of a rank: no shard of any rank, so that one of them can look for all.
    integer function next_number(self, tag) result(next)
       class(sweep_index), intent(in) :: self
       character(len=*), intent(in) :: tag
@@ -166,7 +166,8 @@ contains
       next = 1
       call list_directory(self%directory//'/shards', names)
       do i = 1, size(names)
-         if (index(names(i), tag//'-') /= 1) cycle
+         if (names(i)(1:1) /= tag(1:1) .or. names(i)(len(tag) + 1:len(tag) + 1) /= '-') cycle
+         if (tag(1:1) /= 'r' .and. index(names(i), tag//'-') /= 1) cycle
          read (names(i)(len(tag) + 2:len(tag) + 7), '(i6)', iostat=stat) number
          if (stat == 0) next = max(next, number + 1)
       end do
