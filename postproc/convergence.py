@@ -169,7 +169,8 @@ def draw_line(axes: Axes, i: int, x: np.ndarray, error: np.ndarray, fit: Fit | N
     axes.plot(x[used], error[used], linestyle="none", marker=look["marker"], color=look["color"])
     if fit is not None:
         ends = np.array([x[used].min(), x[used].max()])
-        axes.plot(ends, fit.factor * ends ** (-fit.order if rising else fit.order), color=look["color"], linestyle="-", linewidth=2.2, alpha=0.35)
+        line = fit.factor * ends ** (-fit.order if rising else fit.order)
+        axes.plot(ends, line, color=look["color"], linestyle="-", linewidth=2.2, alpha=0.35)
 
 
 def main() -> int:

@@ -1,4 +1,4 @@
-"""Where the spacecraft, the nodes and the points of the rods are, MODEL of the article: nodes joined by chords, cubic rods on them."""
+"""Where spacecraft, nodes and points of the rods are: nodes joined by chords, cubic deflections on them."""
 
 from __future__ import annotations
 

@@ -54,9 +54,6 @@ def draw(run: Run, panels: Sequence[tuple[str, Sequence[Quantity]]], title: str)
         draw_panel(axes, time, title, quantities)
     for axes in grid.flat[len(panels):]:
         axes.set_visible(False)
-    for axes in grid[-1]:
-        axes.set_xlabel("time $t$ [s]")
-        axes.tick_params(labelbottom=True)
     return figure
 
 
@@ -65,7 +62,7 @@ def draw_panel(axes: Axes, time, title: str, quantities: Sequence[Quantity]) -> 
         axes.plot(*style.envelope(time, quantity.values), label=quantity.symbol, **style.line_style(i))
     symbols = ", ".join(q.symbol for q in quantities) if len(quantities) <= 4 else quantities[0].symbol + ", …"
     axes.set_ylabel(f"{symbols} [{quantities[0].unit}]")
-    axes.margins(x=0)
+    style.time_axis(axes)
     axes.set_title(title, loc="left")
     if len(quantities) > 1:
         style.legend_above(axes)

@@ -47,9 +47,7 @@ def draw(run: Run) -> Figure:
     grid[1, 1].set(ylabel=angular.label)
     grid[1, 1].set_title("angular momentum, inertial origin", loc="left")
     for axes in grid.flat:
-        axes.margins(x=0)
-        axes.set_xlabel("time $t$ [s]")
-        axes.tick_params(labelbottom=True)
+        style.time_axis(axes)
     return figure
 
 

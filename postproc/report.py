@@ -32,7 +32,9 @@ h1 { font-size: 1.5rem; margin-bottom: .2rem; } h2 { font-size: 1.15rem; margin-
 table { border-collapse: collapse; margin: .6rem 0; font-size: 13px; } caption { text-align: left; font-weight: 600; white-space: nowrap; }
 th, td { padding: .2rem .7rem .2rem 0; text-align: left; vertical-align: top; border-bottom: 1px solid #e4e4e4; }
 th.n, td.n { text-align: right; font-variant-numeric: tabular-nums; } td { overflow-wrap: anywhere; }
-figure { margin: 1.2rem 0; } figure img { max-width: 100%; width: 50rem; height: auto; } figure img[src^="data:image/gif"] { width: auto; } figcaption { font-size: 13px; color: #444; }
+figure { margin: 1.2rem 0; } figure img { max-width: 100%; width: 50rem; height: auto; }
+figure img[src^="data:image/gif"] { width: auto; }
+figcaption { font-size: 13px; color: #444; }
 pre { background: #f6f6f6; padding: .8rem; overflow-x: auto; font-size: 12px; line-height: 1.4; }
 .failed { background: #fbe9e7; border-left: 4px solid #b2182b; padding: .5rem .8rem; } .done { color: #444; }
 @media print { body { max-width: none; } details { display: block; } }
@@ -176,7 +178,8 @@ def grid(caption: str, head: Sequence[str], rows: Sequence[Sequence[str]], numbe
         "<tr>" + "".join(f'<td{" class=n" if i >= numbers_from else ""}>{html.escape(c)}</td>' for i, c in enumerate(row)) + "</tr>\n"
         for row in rows
     )
-    top = "<thead><tr>" + "".join(f'<th{" class=n" if i >= numbers_from else ""}>{html.escape(c)}</th>' for i, c in enumerate(head)) + "</tr></thead>" if head else ""
+    heads = "".join(f'<th{" class=n" if i >= numbers_from else ""}>{html.escape(c)}</th>' for i, c in enumerate(head))
+    top = f"<thead><tr>{heads}</tr></thead>" if head else ""
     return f"<table><caption>{html.escape(caption)}</caption>{top}<tbody>{cells}</tbody></table>"
 
 

@@ -7,6 +7,7 @@ line has its own dash pattern besides. Figures are drawn without a display and w
 from __future__ import annotations
 
 import pathlib
+import re
 from collections.abc import Iterable
 from typing import Any
 
@@ -16,10 +17,11 @@ from cycler import cycler
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 COLOURS = ["#000000", "#0072B2", "#D55E00", "#009E73", "#E69F00", "#56B4E9", "#CC79A7"]
-DASHES: list[Any] = ["-", (0, (5, 1.6)), (0, (6, 1.5, 1.2, 1.5)), (0, (1.4, 1.2)), (0, (9, 2)), (0, (3, 1.2, 1, 1.2, 1, 1.2)), (0, (2.5, 2.5))]
+DASHES: list[Any] = ["-", (0, (5, 1.6)), (0, (6, 1.5, 1.2, 1.5)), (0, (1.4, 1.2)), (0, (9, 2)),
+                     (0, (3, 1.2, 1, 1.2, 1, 1.2)), (0, (2.5, 2.5))]
 MARKERS = ["o", "s", "^", "D", "v", "P", "X"]
 FAILED = "#B2182B"
 GREY = "#767676"
@@ -51,7 +53,8 @@ matplotlib.rcParams.update({
     "lines.linewidth": 1.2,
     "lines.markersize": 4.5,
     "axes.formatter.use_mathtext": True,
-    "axes.formatter.limits": (-4, 5),
+    "axes.formatter.limits": (-3, 5),
+    "axes.formatter.useoffset": False,
     "savefig.dpi": 160,
     "pdf.fonttype": 42,
     "svg.fonttype": "path",
@@ -59,7 +62,8 @@ matplotlib.rcParams.update({
 })
 
 
-def new_figure(rows: int = 1, columns: int = 1, *, width: float = WIDTH, height: float | None = None, **options: Any) -> tuple[Figure, np.ndarray]:
+def new_figure(rows: int = 1, columns: int = 1, *, width: float = WIDTH, height: float | None = None,
+               **options: Any) -> tuple[Figure, np.ndarray]:
     """A figure and its axes, as a two-dimensional array."""
     figure = Figure(figsize=(width, height or 0.6 + 2.1 * rows), layout="constrained")
     return figure, figure.subplots(rows, columns, squeeze=False, **options)
@@ -126,10 +130,32 @@ def legend_below(figure: Figure, panels: Iterable[Axes]) -> None:
         figure.legend(found.values(), found.keys(), loc="outside lower center", ncols=columns)
 
 
+def factor_into_label(axis: Axis) -> None:
+    """Write a common factor of the tick labels into the unit: [m] becomes [10^-5 m]. At the end of the axis it may be covered."""
+    factor = re.search(r"10\^\{(-?\d+)\}", axis.get_offset_text().get_text().replace("−", "-"))
+    if factor is None or not axis.get_offset_text().get_visible():
+        return
+    power = f"$10^{{{factor[1]}}}$"
+    words, bracket, unit = axis.get_label_text().rpartition(" [")
+    axis.set_label_text(f"{words} [{power} {unit}" if bracket else f"{unit} [{power}]")
+    axis.get_offset_text().set_visible(False)
+
+
+def time_axis(axes: Axes) -> None:
+    """The lower axis of a time history."""
+    axes.margins(x=0)
+    axes.set_xlabel("time $t$ [s]")
+    axes.tick_params(labelbottom=True)
+    axes.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
+
+
 def settle(figure: Figure) -> None:
     """Find the layout once for all formats. Axes of equal scale move when they are drawn, hence the second pass."""
-    for _ in range(2):
-        figure.draw_without_rendering()
+    figure.draw_without_rendering()
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            factor_into_label(axis)
+    figure.draw_without_rendering()
     figure.set_layout_engine("none")
 
 

@@ -51,7 +51,20 @@ def test_histories_show_the_motion_of_the_spacecraft(runs, tmp_path, name):
             for line, quantity in zip(lines, names, strict=False):
                 assert np.array_equal(line[:, 0], file["time"][()])
                 assert np.array_equal(line[:, 1], file[quantity][()])
-    assert [axes.get_ylabel().rpartition("[")[2] for axes in figure.axes] == ["m/s]", "rad/s]", "m]", "rad]"]
+    assert [re.sub(r"\$10.*\$ ", "", axes.get_ylabel().rpartition("[")[2]) for axes in figure.axes] == ["m/s]", "rad/s]", "m]", "rad]"]
+
+
+def test_a_common_factor_of_an_axis_stands_with_its_unit(runs, tmp_path):
+    with h5py.File(runs["failed"]) as file:
+        largest = np.abs(file["displacement_x"][()]).max()
+    axes = histories.plot(runs["failed"], tmp_path / "x.png").axes[2]
+    assert largest < 1e-3
+    power = int(np.floor(np.log10(largest)))
+    assert axes.get_ylabel() == f"$u_x$, $u_y$ [$10^{{{power}}}$ m]"
+    assert not axes.yaxis.get_offset_text().get_visible()
+    shown = [float(tick.get_text().replace("\N{MINUS SIGN}", "-").replace("$", "").replace("\\mathdefault{", "").rstrip("}"))
+             for tick in axes.get_yticklabels()]
+    assert np.allclose(np.array(shown) * 10.0**power, axes.get_yticks())
 
 
 def test_a_failed_run_says_so_in_its_titles(runs, tmp_path):
