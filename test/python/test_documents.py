@@ -124,8 +124,9 @@ def test_a_report_of_a_sweep_lists_its_failures(sweeps, tmp_path, name):
     assert page.addresses or name == "all_failed"
 
 
-@pytest.mark.parametrize("name", ["n1", "inertia_failed"] if BROWSER else [])
+@pytest.mark.parametrize("name", ["n1", "inertia_failed"])
 def test_a_report_opens_in_a_browser(runs, sweeps, tmp_path, name):
+    assert BROWSER, "no Chromium on the PATH: install one, or name it in RODYN_BROWSER"
     (path,) = report.plot((runs | sweeps)[name], tmp_path / "r.html")
     quiet = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
              "--disable-component-update", "--disable-sync", f"--user-data-dir={tmp_path / 'profile'}", "--window-size=1000,1400"]
