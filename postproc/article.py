@@ -33,6 +33,18 @@ TABLE_2 = [
     Printed("alpha_rate(1)", 240, "0.48113", "0.48115", "0.4811614"),
 ]
 
+def printed(quantity: str, time: float) -> Printed | None:
+    """What tables 1 and 2 print of a quantity at a time; None: nothing."""
+    return next((row for row in TABLE_1 + TABLE_2 if (row.quantity, row.time) == (quantity, time)), None)
+
+
+def range_text(row: Printed | None) -> str:
+    """'0.39531 to 0.39535', or the one number, or nothing."""
+    if row is None:
+        return ""
+    return row.low if row.low == row.high else f"{row.low} to {row.high}"
+
+
 TABLE_3_TIME = 1.0
 TABLE_3_AXIS = "mass_ratio"
 # Degrees for the angles of the rods, m, rad.

@@ -9,20 +9,8 @@ import sys
 
 import numpy as np
 import xarray
+from article import TABLE_3, printed, range_text
 
-PHI_4 = {1: 0.491356055226, 30: 0.01360950381, 60: 0.48224726060, 120: -0.22652528471, 240: 0.50494415485}
-ALPHA_1_RATE = {1: 0.394155296535, 30: -0.3051786, 60: -1.0107406, 120: -0.5632104, 240: 0.4811614}
-ARTICLE_PHI_4 = {1: "0.49135614", 30: "0.01361031 to 0.01361079", 60: "0.48224758 to 0.48224818",
-                 120: "-0.22652622 to -0.22652627", 240: "0.50494062 to 0.50494089"}
-ARTICLE_ALPHA_1_RATE = {1: "0.39531 to 0.39535", 30: "-0.29849 to -0.29895", 60: "-1.01004 to -1.01022",
-                        120: "-0.56372 to -0.56379", 240: "0.48113 to 0.48115"}
-ARTICLE_TABLE_3 = {  # exact and lumped: phi_1, phi_4 [deg], u_x [m], theta [rad]
-    2: ((-16.436, 21.920, 0.194, 4.046), (-18.122, 17.160, 0.192, 4.040)),
-    4: ((14.277, 22.652, 0.258, 2.240), (13.212, 20.339, 0.246, 2.255)),
-    8: ((-60.441, -142.412, 0.104, 3.611), (-60.982, -142.663, 0.103, 3.627)),
-    16: ((-44.534, -180.568, 0.354, 2.849), (-44.189, -180.659, 0.355, 2.844)),
-    32: ((-39.314, -177.633, 0.627, 1.894), (-38.930, -177.281, 0.629, 1.887)),
-}
 HINGES = np.array([7000.0, 5000.0, 5000.0, 5000.0])  # N m/rad, table 3
 
 
@@ -36,8 +24,10 @@ def print_times(sweep: xarray.Dataset, times: list[int]) -> None:
     names = parameter_columns(sweep)
     for t in times:
         state = sweep.sel(probe_time=t)
-        print(f"t = {t} s: reference phi_4 {PHI_4[t]:.12f} rad, alpha_1' {ALPHA_1_RATE[t]:.10g} rad/s; "
-              f"the article {ARTICLE_PHI_4[t]}, {ARTICLE_ALPHA_1_RATE[t]}")
+        angle, slope_rate = printed("phi(4)", t), printed("alpha_rate(1)", t)
+        true_phi, true_rate = float(angle.reference), float(slope_rate.reference)
+        print(f"t = {t} s: reference phi_4 {true_phi:.12f} rad, alpha_1' {true_rate:.10g} rad/s; "
+              f"the article {range_text(angle)}, {range_text(slope_rate)}")
         print("  ".join(f"{name.removeprefix('param_'):>17}" for name in names), f"{'phi_4, rad':>17}{'error':>10}",
               f"{'alpha_1, rad/s':>16}{'error':>10}{'n_rhs':>10}")
         for i in range(sweep.sizes["case"]):
@@ -45,7 +35,7 @@ def print_times(sweep: xarray.Dataset, times: list[int]) -> None:
             if np.isnan(phi):
                 continue
             print("  ".join(f"{sweep[name].values[i]!s:>17.17}" for name in names),
-                  f"{phi:17.12f}{phi - PHI_4[t]:10.1e} {rate:15.10f}{rate - ALPHA_1_RATE[t]:10.1e}{int(sweep.n_rhs[i]):10d}")
+                  f"{phi:17.12f}{phi - true_phi:10.1e} {rate:15.10f}{rate - true_rate:10.1e}{int(sweep.n_rhs[i]):10d}")
 
 
 def pairs(sweep: xarray.Dataset) -> tuple[np.ndarray, xarray.Dataset, xarray.Dataset]:
@@ -73,7 +63,7 @@ def table_3(sweep: xarray.Dataset) -> None:
         for kind, cases in enumerate((exact, lumped)):
             state = cases.isel(case=i, probe_time=-1)
             phi = np.degrees(state.phi.values)
-            theirs = ARTICLE_TABLE_3[int(ratio)][kind]
+            theirs = [float(text) for text in TABLE_3[int(ratio)][kind]]
             # only phi_1 and phi_4 are printed: at least C_0 phi_1^2 / 2, and the rest shared by three equal hinges
             bend = np.radians(theirs[1] - theirs[0])
             least = 0.5 * HINGES[0] * np.radians(theirs[0]) ** 2 + 0.5 * HINGES[1] * bend**2 / 3

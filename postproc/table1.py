@@ -8,8 +8,9 @@ import argparse
 import sys
 from typing import NamedTuple
 
-import h5py
 import numpy as np
+from article import printed, range_text
+from rodyn_data import DataError, open_run
 
 
 class Reference(NamedTuple):
@@ -17,24 +18,18 @@ class Reference(NamedTuple):
 
     value: float
     tolerance: float
-    article: str
 
 
-PHI_4: dict[float, Reference] = {
-    1: Reference(0.491356055226, 1e-10, "0.49135614"),
-    2: Reference(0.413506393534, 1e-10, ""),
-    30: Reference(0.01360950381, 1e-8, "0.01361031 to 0.01361079"),
-    60: Reference(0.48224726060, 1e-7, "0.48224758 to 0.48224818"),
-    120: Reference(-0.22652528471, 1e-7, "-0.22652622 to -0.22652627"),
-    240: Reference(0.50494415485, 1e-7, "0.50494062 to 0.50494089"),
-}
-ALPHA_1_RATE: dict[float, Reference] = {
-    1: Reference(0.394155296535, 1e-8, "0.39531 to 0.39535"),
-    2: Reference(-0.6967200449, 1e-8, ""),
-    30: Reference(-0.3051786, 1e-5, "-0.29849 to -0.29895"),
-    60: Reference(-1.0107406, 1e-4, "-1.01004 to -1.01022"),
-    120: Reference(-0.5632104, 1e-4, "-0.56372 to -0.56379"),
-    240: Reference(0.4811614, 1e-4, "0.48113 to 0.48115"),
+# By name of the quantity: its heading, and what is known by time [s].
+REFERENCES: dict[str, tuple[str, dict[float, Reference]]] = {
+    "phi(4)": ("phi_4, rad", {
+        1: Reference(0.491356055226, 1e-10), 2: Reference(0.413506393534, 1e-10), 30: Reference(0.01360950381, 1e-8),
+        60: Reference(0.48224726060, 1e-7), 120: Reference(-0.22652528471, 1e-7), 240: Reference(0.50494415485, 1e-7),
+    }),
+    "alpha_rate(1)": ("alpha_1', rad/s", {
+        1: Reference(0.394155296535, 1e-8), 2: Reference(-0.6967200449, 1e-8), 30: Reference(-0.3051786, 1e-5),
+        60: Reference(-1.0107406, 1e-4), 120: Reference(-0.5632104, 1e-4), 240: Reference(0.4811614, 1e-4),
+    }),
 }
 
 
@@ -46,32 +41,30 @@ def row_at(time: np.ndarray, t: float) -> int | None:
 
 def print_table(path: str) -> bool:
     """Print the table; true if every number lies within its tolerance."""
-    with h5py.File(path) as run:
-        time = run["time"][:]
-        columns = {
-            "phi_4, rad": (run["phi"][:, 3], PHI_4),
-            "alpha_1', rad/s": (run["alpha_rate"][:, 0], ALPHA_1_RATE),
-        }
-        status = run.attrs["status"].decode()
-    rows = {t: row_at(time, t) for t in PHI_4}
+    with open_run(path) as run:
+        time, status = run.time, run.status
+        columns = {name: run.quantity(name).values for name in REFERENCES}
+    times = list(REFERENCES["phi(4)"][1])
+    rows = {t: row_at(time, t) for t in times}
     if all(row is None for row in rows.values()):
-        times = ", ".join(str(t) for t in PHI_4)
-        raise ValueError(f"no row at t = {times} s (it has {time.size} rows, {time[0]:g} to {time[-1]:g} s)")
+        wanted = ", ".join(str(t) for t in times)
+        raise DataError(f"no row at t = {wanted} s (it has {time.size} rows, {time[0]:g} to {time[-1]:g} s)")
 
     agrees = status == "done"
     if status != "done":
         print(f"This run is not complete: its status is '{status}'.")
-    for name, (values, references) in columns.items():
-        print(f"{'t, s':>5}  {name:>17}  {'reference':>15}  {'difference':>10}  the article's range")
-        for t, (value, tolerance, article) in references.items():
+    for name, (heading, references) in REFERENCES.items():
+        print(f"{'t, s':>5}  {heading:>17}  {'reference':>15}  {'difference':>10}  the article's range")
+        for t, (value, tolerance) in references.items():
             row = rows[t]
             if row is None:
                 continue
-            difference = values[row] - value
-            close = abs(difference) <= tolerance
+            ours = columns[name][row]
+            close = abs(ours - value) <= tolerance
             agrees = agrees and close
             mark = "" if close else f"  (more than {tolerance:.0e} off)"
-            print(f"{t:5g}  {values[row]:17.12f}  {value:15.12g}  {difference:10.1e}  {article}{mark}".rstrip())
+            article = range_text(printed(name, t))
+            print(f"{t:5g}  {ours:17.12f}  {value:15.12g}  {ours - value:10.1e}  {article}{mark}".rstrip())
     return agrees
 
 
@@ -82,7 +75,7 @@ def main() -> int:
     arguments = parser.parse_args()
     try:
         agrees = print_table(arguments.run)
-    except (OSError, KeyError, IndexError, ValueError) as error:
+    except (OSError, IndexError, DataError) as error:
         print(f"{arguments.run}: not a run of the table-1 scene that can be compared: {error}", file=sys.stderr)
         return 2
     return 1 if arguments.check and not agrees else 0
