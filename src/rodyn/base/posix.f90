@@ -6,6 +6,7 @@ module rodyn_posix
       c_long, c_null_char, c_null_funptr, c_null_ptr, c_ptr, c_size_t
    implicit none (type, external)
    private
+   public :: posix_close, posix_closedir, posix_fsync, posix_open, posix_opendir, posix_signal ! for `rodyn_posix_files`
    public :: process_id, host_name, utc_now
    public :: path_exists, same_path, is_directory, is_writable, parent_directory
    public :: sync_path, rename_over, rename_new, remove_file

@@ -6,7 +6,8 @@ module rodyn_posix_files
       c_int64_t, c_loc, c_long, c_null_char, c_ptr, c_size_t
    use rodyn_errors, only: error_type, raise
    use rodyn_kinds, only: i8
-   use rodyn_posix, only: last_failure, last_failure_is, parent_directory, path_exists, rename_over, sync_path
+   use rodyn_posix, only: last_failure, last_failure_is, parent_directory, path_exists, rename_over, sync_path, &
+      posix_close, posix_closedir, posix_fsync, posix_open, posix_opendir, posix_signal
    implicit none (type, external)
    private
    public :: make_directory, list_directory
@@ -50,15 +51,6 @@ module rodyn_posix_files
          integer(c_int) :: descriptor
       end function posix_creat
 
-      ! variadic in C; without its third argument the call is an ordinary one
-      function posix_open(path, flags) result(descriptor) bind(c, name='open')
-         import :: c_char, c_int
-         implicit none (type, external)
-         character(kind=c_char), intent(in) :: path(*)
-         integer(c_int), value :: flags
-         integer(c_int) :: descriptor
-      end function posix_open
-
       function posix_write(descriptor, data, bytes) result(written) bind(c, name='write')
          import :: c_int, c_long, c_ptr, c_size_t
          implicit none (type, external)
@@ -68,20 +60,6 @@ module rodyn_posix_files
          integer(c_long) :: written
       end function posix_write
 
-      function posix_close(descriptor) result(status) bind(c, name='close')
-         import :: c_int
-         implicit none (type, external)
-         integer(c_int), value :: descriptor
-         integer(c_int) :: status
-      end function posix_close
-
-      function posix_fsync(descriptor) result(status) bind(c, name='fsync')
-         import :: c_int
-         implicit none (type, external)
-         integer(c_int), value :: descriptor
-         integer(c_int) :: status
-      end function posix_fsync
-
       function posix_mkdir(path, mode) result(status) bind(c, name='mkdir')
          import :: c_char, c_int
          implicit none (type, external)
@@ -90,26 +68,12 @@ module rodyn_posix_files
          integer(c_int) :: status
       end function posix_mkdir
 
-      function posix_opendir(path) result(stream) bind(c, name='opendir')
-         import :: c_char, c_ptr
-         implicit none (type, external)
-         character(kind=c_char), intent(in) :: path(*)
-         type(c_ptr) :: stream
-      end function posix_opendir
-
       function posix_readdir(stream) result(entry) bind(c, name='readdir')
          import :: c_ptr
          implicit none (type, external)
          type(c_ptr), value :: stream
          type(c_ptr) :: entry
       end function posix_readdir
-
-      function posix_closedir(stream) result(status) bind(c, name='closedir')
-         import :: c_int, c_ptr
-         implicit none (type, external)
-         type(c_ptr), value :: stream
-         integer(c_int) :: status
-      end function posix_closedir
 
       ! variadic in C; with integers and pointers only, all calling conventions of Linux pass these the same way
       function posix_fcntl(descriptor, command, lock) result(status) bind(c, name='fcntl')
@@ -120,13 +84,6 @@ module rodyn_posix_files
          integer(c_int) :: status
       end function posix_fcntl
 
-      function posix_signal(number, handler) result(previous) bind(c, name='signal')
-         import :: c_funptr, c_int
-         implicit none (type, external)
-         integer(c_int), value :: number
-         type(c_funptr), value :: handler
-         type(c_funptr) :: previous
-      end function posix_signal
    end interface
 
 contains

@@ -10,8 +10,7 @@ module rodyn_cvode_integrator
    use rodyn_ode, only: ode_system
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, time_text
    use rodyn_nvector, only: new_nvector, free_nvector, vector_content, content_of
-   use rodyn_sundials_base, only: callback_data, rhs_shim, weights_shim, quiet_handler, all_finite, failure_text, &
-      c_text, c_release
+   use rodyn_sundials_base, only: callback_data, rhs_shim, weights_shim, quiet_handler, all_finite, raise_return_code
    use fsundials_context_mod, only: FSUNContext_Create, FSUNContext_Free
    use fsundials_nvector_mod, only: N_Vector
    use fsundials_matrix_mod, only: SUNMatrix, FSUNMatDestroy
@@ -355,15 +354,7 @@ contains
       character(len=*), intent(in) :: call_name
       real(wp), intent(in), optional :: t !! [s]
 
-      character(len=:), allocatable :: place
-      type(c_ptr) :: name
-
-      if (flag >= 0_c_int) return
-      place = ''
-      if (present(t)) place = ' at t = '//time_text(t)//' s'
-      name = flag_name(int(flag, c_long))
-      call raise(error, call_name//place//': '//failure_text(flag)//' ('//c_text(name)//')')
-      if (c_associated(name)) call c_release(name)
+      if (flag < 0_c_int) call raise_return_code(error, flag, flag_name(int(flag, c_long)), call_name, t)
    end subroutine check
 
 end module rodyn_cvode_integrator

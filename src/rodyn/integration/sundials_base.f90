@@ -3,12 +3,14 @@ module rodyn_sundials_base
    use, intrinsic :: iso_c_binding, only: c_ptr, c_int, c_long, c_double, c_char, c_size_t, c_null_char, &
       c_f_pointer, c_loc, c_associated
    use rodyn_kinds, only: wp, i8
+   use rodyn_errors, only: error_type, raise
    use rodyn_ode, only: ode_system
+   use rodyn_integrator, only: time_text
    use rodyn_nvector, only: vector_content, content_of
    use fsundials_nvector_mod, only: N_Vector
    implicit none (type, external)
    private
-   public :: callback_data, rhs_shim, weights_shim, quiet_handler, all_finite, failure_text, c_text, c_release, sundials_version
+   public :: callback_data, rhs_shim, weights_shim, quiet_handler, all_finite, raise_return_code, sundials_version
 
    !> What the callbacks find behind `user_data`.
    type :: callback_data
@@ -141,6 +143,22 @@ contains
       case default; text = 'failed'
       end select
    end function failure_text
+
+   !> A negative return code as an error that names the call, the time and the code.
+   subroutine raise_return_code(error, flag, name, call_name, t)
+      type(error_type), allocatable, intent(inout) :: error
+      integer(c_int), intent(in) :: flag
+      type(c_ptr), intent(in) :: name            !! of the code, in memory that is freed here
+      character(len=*), intent(in) :: call_name
+      real(wp), intent(in), optional :: t        !! [s]
+
+      character(len=:), allocatable :: place
+
+      place = ''
+      if (present(t)) place = ' at t = '//time_text(t)//' s'
+      call raise(error, call_name//place//': '//failure_text(flag)//' ('//c_text(name)//')')
+      if (c_associated(name)) call c_release(name)
+   end subroutine raise_return_code
 
    !> A C string as text; empty for a null pointer.
    function c_text(address) result(text)
