@@ -150,7 +150,7 @@ contains
          'c.nml:3: &case n_outputs = 1.5: must be a whole number'//nl//&
          'c.nml:4: &output ledger = 1: must be .true. or .false.'//nl//&
          'c.nml:4: &output compression = ''4'': must be a whole number'//nl//&
-         'c.nml:5: &solver method = adams: must be ''auto'', ''adams'', ''bdf'', ''erk'' or ''dop853'', in '//&
+         'c.nml:5: &solver method = adams: must be ''auto'', ''adams'', ''bdf'', ''erk'', ''dop853'' or ''gauss'', in '//&
          'quotes')
    end subroutine wrong_types
 

@@ -180,7 +180,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       call expect_faults(error, &
          valid//'&solver method = ''adams'', fixed_step = 0.1 /'//nl, &
-         'c.nml:3: &solver fixed_step = 0.1: is possible with method = ''erk'' or ''dop853'' only')
+         'c.nml:3: &solver fixed_step = 0.1: is possible with method = ''erk'', ''dop853'' or ''gauss'' only')
    end subroutine fixed_step_adams
 
    subroutine no_echo(error)

@@ -5,6 +5,7 @@ program tester
    use test_case_keys, only: collect_case_keys
    use test_case_reader, only: collect_case_reader
    use test_case_rules, only: collect_case_rules
+   use test_gauss, only: collect_gauss
    use test_beams, only: collect_beams
    use test_invariants, only: collect_invariants
    use test_hdf5_files, only: collect_hdf5_files
@@ -39,6 +40,7 @@ program tester
    call run('kernels', collect_kernels)
    call run('motion', collect_motion)
    call run('integrators', collect_integrators)
+   call run('gauss', collect_gauss)
    call run('progress', collect_progress)
    call run('namelist', collect_namelist)
    call run('namelist_faults', collect_namelist_faults)

@@ -17,7 +17,7 @@ contains
    subroutine collect_article(suite)
       type(unittest), allocatable, intent(out) :: suite(:)
       suite = [new_test('table 1: phi_4 and alpha_1'' at 1, 2 and 30 s by adams', test_tables), &
-               new_test('table 1: phi_4 and alpha_1'' at 1 and 2 s by erk and dop853', test_explicit), &
+               new_test('table 1: phi_4 and alpha_1'' at 1 and 2 s by erk, dop853 and gauss', test_explicit), &
                new_test('table 1: phi_4 and alpha_1'' at 1 s by bdf and the assembled kernel', test_bdf), &
                new_test('table 1 with the consistent formulation', test_consistent), &
                new_test('table 1 with the printed inputs, both formulations', test_printed_inputs), &
@@ -70,12 +70,12 @@ contains
 
    subroutine test_explicit(error)
       type(error_type), allocatable, intent(out) :: error
-      character(len=6), parameter :: methods(2) = [character(len=6) :: 'erk', 'dop853']
+      character(len=6), parameter :: methods(3) = [character(len=6) :: 'erk', 'dop853', 'gauss']
       type(case_config) :: config
       integer :: i
       call read_table1(config, error)
       if (allocated(error)) return
-      do i = 1, 2
+      do i = 1, size(methods)
          config%solver%method = methods(i)
          call compare(config, [1.0_wp, 2.0_wp], [0.491356055226_wp, 0.413506393534_wp], &
                       [0.394155296535_wp, -0.6967200449_wp], [1.0e-10_wp, 1.0e-10_wp], [1.0e-8_wp, 1.0e-8_wp], error)
@@ -199,14 +199,14 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(case_config) :: config
       type(trajectory) :: few, many
-      character(len=6), parameter :: methods(4) = [character(len=6) :: 'adams', 'bdf', 'erk', 'dop853']
+      character(len=6), parameter :: methods(5) = [character(len=6) :: 'adams', 'bdf', 'erk', 'dop853', 'gauss']
       integer :: i, m
 
       call read_table1(config, error)
       if (allocated(error)) return
       config%solver%rtol = 1.0e-6_wp
       config%solver%atol = 1.0e-8_wp
-      do m = 1, 4
+      do m = 1, size(methods)
          config%solver%method = methods(m)
          call integrate(config, [0.2_wp], few, error)
          if (allocated(error)) return

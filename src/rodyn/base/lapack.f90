@@ -6,7 +6,7 @@ module rodyn_lapack
    implicit none (type, external)
    private
    public :: use_one_thread
-   public :: dpotrf, dpotrs, dgesv, dsygvd, dgemv
+   public :: dpotrf, dpotrs, dgesv, dsygvd, dsyev, dgeev, dgemv, dgemm
 
    interface
       !> Cholesky factors of a symmetric positive definite matrix.
@@ -53,6 +53,41 @@ module rodyn_lapack
          integer, intent(inout) :: iwork(*)
          integer, intent(out) :: info
       end subroutine dsygvd
+
+      !> Eigenvalues (ascending) and vectors of a symmetric matrix.
+      pure subroutine dsyev(jobz, uplo, n, a, lda, w, work, lwork, info)
+         import :: wp
+         implicit none (type, external)
+         character(len=1), intent(in) :: jobz, uplo
+         integer, intent(in) :: n, lda, lwork
+         real(wp), intent(inout) :: a(lda, *)
+         real(wp), intent(out) :: w(*)
+         real(wp), intent(inout) :: work(*)
+         integer, intent(out) :: info
+      end subroutine dsyev
+
+      !> Eigenvalues, left and right vectors of a general matrix.
+      pure subroutine dgeev(jobvl, jobvr, n, a, lda, wr, wi, vl, ldvl, vr, ldvr, work, lwork, info)
+         import :: wp
+         implicit none (type, external)
+         character(len=1), intent(in) :: jobvl, jobvr
+         integer, intent(in) :: n, lda, ldvl, ldvr, lwork
+         real(wp), intent(inout) :: a(lda, *)
+         real(wp), intent(out) :: wr(*), wi(*), vl(ldvl, *), vr(ldvr, *)
+         real(wp), intent(inout) :: work(*)
+         integer, intent(out) :: info
+      end subroutine dgeev
+
+      !> C <- alpha A B + beta C.
+      pure subroutine dgemm(transa, transb, m, n, k, alpha, a, lda, b, ldb, beta, c, ldc)
+         import :: wp
+         implicit none (type, external)
+         character(len=1), intent(in) :: transa, transb
+         integer, intent(in) :: m, n, k, lda, ldb, ldc
+         real(wp), intent(in) :: alpha, beta
+         real(wp), intent(in) :: a(lda, *), b(ldb, *)
+         real(wp), intent(inout) :: c(ldc, *)
+      end subroutine dgemm
 
       !> y <- alpha A x + beta y.
       pure subroutine dgemv(trans, m, n, alpha, a, lda, x, incx, beta, y, incy)

@@ -10,6 +10,9 @@ module rodyn_accelerations
    use rodyn_recursion_flexible, only: flexible_accelerations
    use rodyn_recursion_rigid, only: rigid_accelerations
    use rodyn_recursion_lumped, only: lumped_accelerations
+   use rodyn_lanes, only: lanes
+   use rodyn_lane_scene, only: lane_scene, new_lane_scene, suits_lanes
+   use rodyn_lane_recursion_flexible, only: lane_work, new_lane_work, lane_flexible_accelerations
    use rodyn_assembled, only: assembled_system, new_assembled_system, assembled_accelerations
    implicit none (type, external)
    private
@@ -27,9 +30,13 @@ module rodyn_accelerations
       integer :: path = path_flexible  !! which kernel
       logical :: needs_moments = .true. !! the kernel does not form them itself
       logical :: varying = .false.     !! some load changes within the regime
+      type(lane_scene), allocatable :: group !! the scene in every lane; allocated when first needed
+      type(lane_work) :: group_work
+      logical :: group_is_current = .false.  !! its forces are those of the regime
    contains
       procedure :: set_regime
       procedure :: accelerations
+      procedure :: lane_accelerations
    end type dynamics_type
 
 contains
@@ -64,6 +71,7 @@ contains
       call new_load_regime(self%regime, self%scene%loads, t_from, t_to, self%scene%n)
       call evaluate_loads(self%forces, self%regime, t_from, fresh=.true.)
       self%varying = size(self%regime%varying) > 0
+      self%group_is_current = .false.
    end subroutine set_regime
 
    !> p' for given coordinates and rates. Allocates nothing.
@@ -99,5 +107,52 @@ contains
          end select
       end associate
    end subroutine accelerations
+
+   !> The same at several times and states at once, which is faster where there is a kernel for it.
+   subroutine lane_accelerations(self, t, q, p, acceleration, ok)
+      class(dynamics_type), intent(inout) :: self
+      real(wp), intent(in) :: t(lanes)                        !! [s], within the regime
+      real(wp), contiguous, intent(in) :: q(:, :), p(:, :)    !! (lanes, n_dof)
+      real(wp), contiguous, intent(out) :: acceleration(:, :) !! p' (lanes, n_dof)
+      logical, intent(out) :: ok                              !! false: not in every lane
+      real(wp) :: one(self%scene%n_dof)
+      logical :: lane_ok(lanes)
+      integer :: i
+
+      if (.not. suits_lanes(self%scene)) then
+         do i = 1, lanes
+            call self%accelerations(t(i), q(i, :), p(i, :), one, ok)
+            if (.not. ok) return
+            acceleration(i, :) = one
+         end do
+         return
+      end if
+      if (self%varying .or. .not. self%group_is_current) call load_lanes(self, t)
+      associate (b => self%scene%n_base, n => self%scene%n)
+         call lane_flexible_accelerations(self%group, self%group_work, q(:, b + 1:b + n), q(:, b + n + 1:b + 2*n), &
+                                          q(:, b + 2*n + 1:b + 3*n), p, acceleration, lane_ok)
+      end associate
+      ok = all(lane_ok)
+   end subroutine lane_accelerations
+
+   !> Put the forces at the time of each lane into the group.
+   subroutine load_lanes(self, t)
+      type(dynamics_type), intent(inout) :: self
+      real(wp), intent(in) :: t(lanes) !! [s]
+      integer :: i
+
+      if (.not. allocated(self%group)) then
+         allocate (self%group)
+         call new_lane_scene(self%group, self%scene, one_rod_each=.false.)
+         call new_lane_work(self%group_work, self%scene%n)
+      end if
+      self%group%loaded = self%regime%on_nodes
+      do i = 1, lanes
+         if (self%varying) call evaluate_loads(self%forces, self%regime, t(i), fresh=.false.)
+         self%group%base_force(i, :) = self%forces%base
+         if (self%regime%on_nodes) self%group%node_force(i, :, :) = self%forces%node
+      end do
+      self%group_is_current = .true.
+   end subroutine load_lanes
 
 end module rodyn_accelerations

@@ -6,9 +6,13 @@
 module rodyn_motion
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
-   use rodyn_ode, only: ode_system
+   use rodyn_lanes, only: lanes
+   use rodyn_ode, only: mechanical_system, stiff_modes
+   use rodyn_scene_modes, only: modes_finder, new_modes_finder
+   use rodyn_trigonometry, only: sine_cosine
    use rodyn_case_config, only: initial_config
    use rodyn_scene, only: scene_type
+   use rodyn_loads, only: evaluate_loads
    use rodyn_accelerations, only: dynamics_type, new_dynamics
    use rodyn_assembled, only: assembled_system, new_assembled_system, mass_matrix
    use rodyn_linearisation, only: balance_tangent
@@ -20,16 +24,20 @@ module rodyn_motion
    public :: motion_type, new_motion, initial_state, state_invariants
 
    !> A running scene.
-   type, extends(ode_system) :: motion_type
+   type, extends(mechanical_system) :: motion_type
       type(dynamics_type) :: dynamics
+      type(modes_finder), allocatable :: modes !! allocated when first needed
       type(assembled_system) :: system !! mass matrix of the Jacobian; allocated when first needed
       integer :: n_q = 0               !! length of q
-      integer :: n_dof = 0             !! length of p
       logical :: free = .true.         !! the spacecraft moves
       logical :: ledger = .true.       !! y ends with work and dissipated energy
    contains
       procedure :: rhs
       procedure :: jacobian
+      procedure :: has_lanes
+      procedure :: lane_accelerations
+      procedure :: find_modes
+      procedure :: quadratures
    end type motion_type
 
 contains
@@ -46,6 +54,7 @@ contains
       motion%n_q = scene%n_q
       motion%n_dof = scene%n_dof
       motion%free = scene%n_base > 0
+      motion%turning = motion%free
       motion%ledger = ledger
       motion%n_controlled = scene%n_q + scene%n_dof
       motion%n_states = motion%n_controlled + merge(2, 0, ledger)
@@ -88,7 +97,6 @@ contains
       real(wp), contiguous, intent(in) :: y(:)
       real(wp), contiguous, intent(out) :: ydot(:)
       logical, intent(out) :: ok
-      integer :: i
 
       associate (r => self%n_q, m => self%n_dof)
          call self%dynamics%accelerations(t, y(1:r), y(r + 1:r + m), ydot(r + 1:r + m), ok)
@@ -98,21 +106,81 @@ contains
             ydot(2) = ydot(2) - y(r + 3)*y(1)
          end if
          if (r > m) call relaxation_rates(self%dynamics%scene%hinges, self%dynamics%work%moment, y(m + 1:r), ydot(m + 1:r))
-         if (.not. self%ledger) return
-         ydot(r + m + 1) = load_power(self%dynamics%scene, y(1:r), y(r + 1:r + m), self%dynamics%forces%base, &
-                                      self%dynamics%regime%on_nodes, self%dynamics%forces%node)
-         if (r > m) then
-            associate (d => self%dynamics%scene%hinges%damping, relaxing => self%dynamics%scene%hinges%relaxing)
-               ydot(r + m + 2) = 0.0_wp
-               do i = 1, r - m
-                  ydot(r + m + 2) = ydot(r + m + 2) + d(relaxing(i))*ydot(m + i)**2
-               end do
-            end associate
-         else
-            call damper_power(self%dynamics%scene, y(r + 1:r + m), self%dynamics%work%theta, ydot(r + m + 2))
-         end if
+         if (self%ledger) call powers(self, y(1:r), y(r + 1:r + m), ydot(m + 1:r), ydot(r + m + 1:))
       end associate
    end subroutine rhs
+
+   !> Power of the loads and dissipated power. The loads are those of the last evaluation.
+   subroutine powers(self, q, p, joint_rate, power)
+      class(motion_type), intent(inout) :: self
+      real(wp), intent(in) :: q(:), p(:)
+      real(wp), intent(in) :: joint_rate(:) !! th' of the relaxing hinges [rad/s]
+      real(wp), intent(out) :: power(2)     !! [W]
+      integer :: i
+
+      power(1) = load_power(self%dynamics%scene, q, p, self%dynamics%forces%base, &
+                            self%dynamics%regime%on_nodes, self%dynamics%forces%node)
+      if (size(joint_rate) > 0) then
+         associate (d => self%dynamics%scene%hinges%damping, relaxing => self%dynamics%scene%hinges%relaxing)
+            power(2) = 0.0_wp
+            do i = 1, size(joint_rate)
+               power(2) = power(2) + d(relaxing(i))*joint_rate(i)**2
+            end do
+         end associate
+      else
+         call damper_power(self%dynamics%scene, p, self%dynamics%work%theta, power(2))
+      end if
+   end subroutine powers
+
+   !> True unless joints of their own stand behind the coordinates.
+   logical function has_lanes(self)
+      class(motion_type), intent(in) :: self
+      has_lanes = self%n_q == self%n_dof
+   end function has_lanes
+
+   !> p' at several times and states at once.
+   subroutine lane_accelerations(self, t, q, p, acceleration, ok)
+      class(motion_type), intent(inout) :: self
+      real(wp), intent(in) :: t(lanes)
+      real(wp), contiguous, intent(in) :: q(:, :), p(:, :)    !! (lanes, n_dof)
+      real(wp), contiguous, intent(out) :: acceleration(:, :) !! (lanes, n_dof)
+      logical, intent(out) :: ok
+      call self%dynamics%lane_accelerations(t, q, p, acceleration, ok)
+   end subroutine lane_accelerations
+
+   !> Stiff modes at q; none if there are too many unknowns.
+   subroutine find_modes(self, q, slowest, modes, ok)
+      class(motion_type), intent(inout) :: self
+      real(wp), intent(in) :: q(:)
+      real(wp), intent(in) :: slowest !! [rad/s]
+      type(stiff_modes), intent(inout) :: modes
+      logical, intent(out) :: ok
+
+      if (.not. allocated(self%modes)) then
+         allocate (self%modes)
+         call new_modes_finder(self%modes, self%dynamics%scene)
+      end if
+      ok = .true.
+      modes%n = 0
+      if (.not. self%modes%available) return
+      associate (scene => self%dynamics%scene, work => self%dynamics%work)
+         call sine_cosine(scene%n, q(scene%n_base + 1:scene%n_base + scene%n), work%sine(1:), work%cosine(1:))
+         call self%modes%find(scene, work%sine, work%cosine, q, slowest, modes, ok)
+      end associate
+   end subroutine find_modes
+
+   !> Power of the loads and dissipated power.
+   subroutine quadratures(self, t, q, p, rate)
+      class(motion_type), intent(inout) :: self
+      real(wp), intent(in) :: t
+      real(wp), intent(in) :: q(:), p(:)
+      real(wp), intent(out) :: rate(:)
+      real(wp) :: none(0)
+      associate (dynamics => self%dynamics)
+         if (dynamics%varying) call evaluate_loads(dynamics%forces, dynamics%regime, t, fresh=.false.)
+      end associate
+      call powers(self, q, p, none, rate)
+   end subroutine quadratures
 
    !> Energies and momenta of a state.
    pure function state_invariants(motion, y) result(values)

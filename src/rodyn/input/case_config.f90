@@ -78,12 +78,12 @@ module rodyn_case_config
 
    !> &solver
    type :: solver_config
-      character(len=name_length) :: method = 'auto' !! 'auto', 'adams', 'bdf', 'erk', 'dop853'
+      character(len=name_length) :: method = 'auto' !! 'auto', 'adams', 'bdf', 'erk', 'dop853', 'gauss'
       real(wp) :: rtol = 1.0e-8_wp                  !! relative tolerance
       real(wp) :: atol = 1.0e-10_wp                 !! absolute tolerance, all states
       integer :: order = 0                          !! highest order; 0: the method's own choice
       real(wp) :: max_step = 0.0_wp                 !! [s]; 0: no bound
-      real(wp) :: fixed_step = 0.0_wp               !! [s], 'erk', 'dop853'; 0: adaptive
+      real(wp) :: fixed_step = 0.0_wp               !! [s], 'erk', 'dop853', 'gauss'; 0: adaptive
       integer :: max_steps = 1000000000             !! steps of the whole run
    end type solver_config
 

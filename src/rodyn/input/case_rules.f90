@@ -166,8 +166,8 @@ contains
       if (.not. is_sound(checked, 'solver', 1, 'method')) return
       rule = order_rule(config%solver%method, config%solver%order)
       if (len(rule) > 0 .and. is_sound(checked, 'solver', 1, 'order')) call blame(checked, 'solver', 1, 'order', rule)
-      if (config%solver%fixed_step <= 0.0_wp .or. any(config%solver%method == ['erk   ', 'dop853'])) return
-      call blame(checked, 'solver', 1, 'fixed_step', "is possible with method = 'erk' or 'dop853' only")
+      if (config%solver%fixed_step <= 0.0_wp .or. any(config%solver%method == ['erk   ', 'dop853', 'gauss '])) return
+      call blame(checked, 'solver', 1, 'fixed_step', "is possible with method = 'erk', 'dop853' or 'gauss' only")
    end subroutine check_solver
 
    !> What a method says against an order; empty if nothing.
@@ -184,6 +184,8 @@ contains
          if (order > 5) rule = "must lie in 0..5 when method = 'bdf'"
       case ('erk')
          if (order == 1 .or. order > 8) rule = "must be 0 or lie in 2..8 when method = 'erk'"
+      case ('gauss')
+         if (order /= 0 .and. order /= 16) rule = "must be 0 or 16 when method = 'gauss'"
       case ('dop853')
          if (order /= 0 .and. order /= 8) rule = "must be 0 or 8 when method = 'dop853'"
       case default ! 'adams' takes what the table allows

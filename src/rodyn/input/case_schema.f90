@@ -109,8 +109,8 @@ module rodyn_case_schema
          when="required when law = 'table'", help='increasing times, two at least'), &
       schema_row('load', 'values', type_real, any_list, 'N or N m', 'depends', &
          when="required when law = 'table'", help='value at each of the times, linear in between'), &
-      schema_row('solver', 'method', type_word, default="'auto'", words='auto|adams|bdf|erk|dop853', &
-         help='auto chooses from the scene; adams, bdf: CVODE; erk: ARKODE; dop853: our own order 8'), &
+      schema_row('solver', 'method', type_word, default="'auto'", words='auto|adams|bdf|erk|dop853|gauss', &
+         help='auto chooses from the scene; adams, bdf: CVODE; erk: ARKODE; dop853, gauss: our own, orders 8 and 16'), &
       schema_row('solver', 'rtol', type_real, default='1.0e-8', rule=between, low=0.0_wp, high=1.0_wp, &
          help='relative tolerance'), &
       schema_row('solver', 'atol', type_real, default='1.0e-10', rule=positive, &
@@ -120,7 +120,7 @@ module rodyn_case_schema
       schema_row('solver', 'max_step', type_real, unit='s', default='0.0', rule=not_negative, &
          help='longest step; 0: no bound'), &
       schema_row('solver', 'fixed_step', type_real, unit='s', default='0.0', rule=not_negative, &
-         help="constant step of erk or dop853; 0: adaptive"), &
+         help="constant step of erk, dop853 or gauss; 0: adaptive"), &
       schema_row('solver', 'max_steps', type_integer, default='1000000000', rule=at_least, low=1.0_wp, &
          help='most steps of the whole run'), &
       schema_row('output', 'file', type_text, default="''", rule=up_to, high=4096.0_wp, &

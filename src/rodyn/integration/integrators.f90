@@ -7,13 +7,14 @@ module rodyn_integrators
    use rodyn_cvode_integrator, only: cvode_integrator, new_cvode_integrator
    use rodyn_erk_integrator, only: erk_integrator, new_erk_integrator
    use rodyn_dop853_integrator, only: dop853_integrator, new_dop853_integrator
+   use rodyn_gauss_integrator, only: gauss_integrator, new_gauss_integrator
    use rodyn_sundials_base, only: sundials_version
    implicit none (type, external)
    private
    public :: new_integrator, integrator_names, sundials_version
 
    !> What `method` may be.
-   character(len=6), parameter :: integrator_names(4) = [character(len=6) :: 'adams', 'bdf', 'erk', 'dop853']
+   character(len=6), parameter :: integrator_names(5) = [character(len=6) :: 'adams', 'bdf', 'erk', 'dop853', 'gauss']
 
 contains
 
@@ -28,6 +29,7 @@ contains
       type(cvode_integrator), allocatable :: cvode
       type(erk_integrator), allocatable :: erk
       type(dop853_integrator), allocatable :: dop853
+      type(gauss_integrator), allocatable :: gauss
 
       call check_options(options, error)
       if (allocated(error)) return
@@ -44,8 +46,12 @@ contains
          allocate (dop853)
          call new_dop853_integrator(dop853, system, options, error)
          call move_alloc(dop853, integrator)
+      case ('gauss')
+         allocate (gauss)
+         call new_gauss_integrator(gauss, system, options, error)
+         call move_alloc(gauss, integrator)
       case default
-         call raise(error, 'no integrator is called '''//trim(method)//'''; there are adams, bdf, erk and dop853')
+         call raise(error, 'no integrator is called '''//trim(method)//'''; there are adams, bdf, erk, dop853 and gauss')
       end select
    end subroutine new_integrator
 

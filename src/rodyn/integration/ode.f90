@@ -1,9 +1,10 @@
 !> What an integrator needs to know of a system of first-order equations y' = f(t, y), and no more.
 module rodyn_ode
    use rodyn_kinds, only: wp
+   use rodyn_lanes, only: lanes
    implicit none (type, external)
    private
-   public :: ode_system
+   public :: ode_system, mechanical_system, stiff_modes
 
    !> A system of `n_states` equations, of which the first `n_controlled` take part in step-size control.
    !> The others are pure quadratures (work, dissipated energy): no equation depends on them, and a run
@@ -15,6 +16,69 @@ module rodyn_ode
       procedure(rhs_interface), deferred :: rhs
       procedure(jacobian_interface), deferred :: jacobian
    end type ode_system
+
+   !> The stiff part of M(q) p' = ... - K q - D p near a configuration, as modes: S = M^-1 K ~ sum omega^2 u v^T and
+   !> M^-1 D ~ sum damping u v^T, with v_i^T u_j = delta_ij.
+   type :: stiff_modes
+      integer :: n = 0                       !! modes
+      real(wp), allocatable :: omega_2(:)    !! square of the natural frequency (n) [rad^2/s^2]
+      real(wp), allocatable :: damping(:)    !! (n) [1/s]
+      real(wp), allocatable :: u(:, :)       !! shapes, transposed (n, n_dof)
+      real(wp), allocatable :: v(:, :)       !! their duals (n_dof, n)
+   end type stiff_modes
+
+   !> A mechanical system: y = (q, p [, quadratures]) with p' from q, p and t, and q' = p, except that q(1:2) are
+   !> measured along axes that turn at the rate p(3), if `turning`.
+   type, abstract, extends(ode_system) :: mechanical_system
+      integer :: n_dof = 0        !! length of p
+      logical :: turning = .false. !! q(1)' = p(1) + p(3) q(2),  q(2)' = p(2) - p(3) q(1); p' does not depend on q(1:3)
+   contains
+      procedure(can_interface), deferred :: has_lanes
+      procedure(lanes_interface), deferred :: lane_accelerations
+      procedure(modes_interface), deferred :: find_modes
+      procedure(quadratures_interface), deferred :: quadratures
+   end type mechanical_system
+
+   abstract interface
+      !> True if q has the length of p and the procedures below work.
+      logical function can_interface(self)
+         import :: mechanical_system
+         implicit none (type, external)
+         class(mechanical_system), intent(in) :: self
+      end function can_interface
+
+      !> p' at several times and states at once.
+      subroutine lanes_interface(self, t, q, p, acceleration, ok)
+         import :: mechanical_system, wp, lanes
+         implicit none (type, external)
+         class(mechanical_system), intent(inout) :: self
+         real(wp), intent(in) :: t(lanes)                        !! [s]
+         real(wp), contiguous, intent(in) :: q(:, :), p(:, :)    !! (lanes, n_dof)
+         real(wp), contiguous, intent(out) :: acceleration(:, :) !! (lanes, n_dof)
+         logical, intent(out) :: ok                              !! false: not in all lanes
+      end subroutine lanes_interface
+
+      !> Modes faster than a given rate.
+      subroutine modes_interface(self, q, slowest, modes, ok)
+         import :: mechanical_system, stiff_modes, wp
+         implicit none (type, external)
+         class(mechanical_system), intent(inout) :: self
+         real(wp), intent(in) :: q(:)     !! (n_dof)
+         real(wp), intent(in) :: slowest  !! modes below this frequency may be left out [rad/s]
+         type(stiff_modes), intent(inout) :: modes
+         logical, intent(out) :: ok
+      end subroutine modes_interface
+
+      !> Rates of the states behind (q, p).
+      subroutine quadratures_interface(self, t, q, p, rate)
+         import :: mechanical_system, wp
+         implicit none (type, external)
+         class(mechanical_system), intent(inout) :: self
+         real(wp), intent(in) :: t
+         real(wp), intent(in) :: q(:), p(:) !! (n_dof)
+         real(wp), intent(out) :: rate(:)   !! (n_states - 2 n_dof)
+      end subroutine quadratures_interface
+   end interface
 
    abstract interface
       !> Right-hand side. Allocates nothing.

@@ -1,0 +1,130 @@
+!> Like scenes side by side, one to a lane of the processor's vectors, as the lane kernels read them.
+!>
+!> Every array has the lane as its first index, so that one vector instruction serves all lanes. The scenes of a
+!> group share what decides the flow of the computation (number of rods, fixed or free spacecraft, kind of rods) and
+!> differ in numbers only. The same scene may stand in all lanes: then a lane is a time, not a scene.
+module rodyn_lane_scene
+   use rodyn_kinds, only: wp
+   use rodyn_lanes, only: lanes
+   use rodyn_rod_constants, only: rod_constants
+   use rodyn_scene, only: scene_type
+   implicit none (type, external)
+   private
+   public :: lane_rod, lane_scene, new_lane_scene, put_scene, suits_lanes
+
+   !> What the recursion reads of a rod (`rodyn_rod_constants`).
+   type :: lane_rod
+      real(wp), dimension(lanes) :: length, length_2, kappa, m0, m1, a1, b1, sa, sb, aa, ab, bb, b11, b12, b22, &
+                                    g1, g2, h1, h2, m0_reduced, m1_reduced, m2_reduced, central, length_m1, offset, outer
+   end type lane_rod
+
+   !> A group of scenes.
+   type :: lane_scene
+      integer :: n = 0      !! rods
+      integer :: n_base = 3 !! 3: free spacecraft, 0: fixed
+      integer :: n_dof = 0  !! length of p
+      logical :: flexible = .true.       !! alpha and beta are unknowns
+      logical :: loaded = .false.        !! some force acts on a node in some lane
+      type(lane_rod), allocatable :: rods(:) !! distinct rods
+      integer, allocatable :: rod_of(:)      !! which of them is rod k (n)
+      real(wp), allocatable :: node_mass(:, :) !! mu (lanes, 0:n) [kg]
+      real(wp), allocatable :: stiffness(:, :) !! C (lanes, 0:n-1) [N m/rad]
+      real(wp), allocatable :: damping(:, :)   !! D (lanes, 0:n-1) [N m s/rad]
+      real(wp), allocatable :: kink_moment(:, :) !! C gamma (lanes, 0:n-1) [N m]
+      real(wp), dimension(lanes) :: mass = 1.0_wp, inertia = 1.0_wp, hinge_x = 0.0_wp, hinge_y = 0.0_wp !! of the spacecraft
+      real(wp), allocatable :: base_force(:, :)    !! X_C, Y_C, M_C (lanes, 3), moving axes
+      real(wp), allocatable :: node_force(:, :, :) !! X, Y (lanes, 2, n), moving axes [N]
+   end type lane_scene
+
+contains
+
+   !> May this scene stand in a lane?
+   pure logical function suits_lanes(scene)
+      type(scene_type), intent(in) :: scene
+      suits_lanes = scene%dynamic_bending .and. .not. scene%assembled
+   end function suits_lanes
+
+   !> A group with the same scene in every lane.
+   subroutine new_lane_scene(group, scene, one_rod_each)
+      type(lane_scene), intent(out) :: group
+      type(scene_type), intent(in) :: scene
+      logical, intent(in) :: one_rod_each !! keep constants per rod, since other scenes will come
+      integer :: i, k
+
+      group%n = scene%n
+      group%n_base = scene%n_base
+      group%n_dof = scene%n_dof
+      group%flexible = scene%dynamic_bending
+      associate (n => scene%n)
+         if (one_rod_each) then
+            allocate (group%rods(n))
+            group%rod_of = [(k, k=1, n)]
+         else
+            allocate (group%rods(size(scene%rods)))
+            group%rod_of = scene%rod_of
+         end if
+         allocate (group%node_mass(lanes, 0:n), group%stiffness(lanes, 0:n - 1), group%damping(lanes, 0:n - 1), &
+                   group%kink_moment(lanes, 0:n - 1), group%base_force(lanes, 3), group%node_force(lanes, 2, n), &
+                   source=0.0_wp)
+      end associate
+      do i = 1, lanes
+         call put_scene(group, i, scene)
+      end do
+   end subroutine new_lane_scene
+
+   !> Put a scene like the others into one lane, without loads.
+   subroutine put_scene(group, lane, scene)
+      type(lane_scene), intent(inout) :: group
+      integer, intent(in) :: lane
+      type(scene_type), intent(in) :: scene
+      integer :: k
+
+      do k = 1, scene%n
+         call put_rod(group%rods(group%rod_of(k)), lane, scene%rods(scene%rod_of(k)))
+      end do
+      group%node_mass(lane, :) = scene%node_mass
+      group%stiffness(lane, :) = scene%hinges%stiffness
+      group%damping(lane, :) = scene%hinges%damping
+      group%kink_moment(lane, :) = scene%hinges%stiffness*scene%hinges%kink
+      group%mass(lane) = scene%body%mass
+      group%inertia(lane) = scene%body%inertia
+      group%hinge_x(lane) = scene%body%hinge_x
+      group%hinge_y(lane) = scene%body%hinge_y
+      group%base_force(lane, :) = 0.0_wp
+      group%node_force(lane, :, :) = 0.0_wp
+   end subroutine put_scene
+
+   pure subroutine put_rod(rods, lane, rod)
+      type(lane_rod), intent(inout) :: rods
+      integer, intent(in) :: lane
+      type(rod_constants), intent(in) :: rod
+
+      rods%length(lane) = rod%length
+      rods%length_2(lane) = rod%length_2
+      rods%kappa(lane) = rod%kappa
+      rods%m0(lane) = rod%inertia%m0
+      rods%m1(lane) = rod%inertia%m1
+      rods%a1(lane) = rod%inertia%a1
+      rods%b1(lane) = rod%inertia%b1
+      rods%sa(lane) = rod%inertia%sa
+      rods%sb(lane) = rod%inertia%sb
+      rods%aa(lane) = rod%second(1)
+      rods%ab(lane) = rod%second(2)
+      rods%bb(lane) = rod%second(3)
+      rods%b11(lane) = rod%b_inverse(1)
+      rods%b12(lane) = rod%b_inverse(2)
+      rods%b22(lane) = rod%b_inverse(3)
+      rods%g1(lane) = rod%g(1)
+      rods%g2(lane) = rod%g(2)
+      rods%h1(lane) = rod%h(1)
+      rods%h2(lane) = rod%h(2)
+      rods%m0_reduced(lane) = rod%m0_reduced
+      rods%m1_reduced(lane) = rod%m1_reduced
+      rods%m2_reduced(lane) = rod%m2_reduced
+      rods%central(lane) = rod%central
+      rods%length_m1(lane) = rod%length_m1
+      rods%offset(lane) = rod%offset
+      rods%outer(lane) = rod%outer
+   end subroutine put_rod
+
+end module rodyn_lane_scene

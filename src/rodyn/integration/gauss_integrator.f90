@@ -1,0 +1,671 @@
+!> Gauss collocation of order 16 for mechanical systems: eight nodes of a step side by side in vector lanes.
+!>
+!> The accelerations at the nodes, F, solve F_i = f(t_i, Q_i, P_i) with
+!>     P = p + h A F,   Q = q + c h p + h^2 A^2 F.
+!> Fixed-point iteration would need steps far below the period of the fastest vibration. Those vibrations are nearly
+!> linear, so each correction solves them implicitly: with the stiff modes (omega, u, v) of `rodyn_ode`, the residual
+!> R = f - F is answered by
+!>     dF = R - sum u G R.v,   G = 1 - (1 + h damping A + h^2 omega^2 A^2)^-1,
+!> and the first guess extrapolates only f + sum u (omega^2 v.Q + damping v.P), which is smooth. Three or four iterations
+!> are enough for steps of half a period. The modes are those of a configuration some steps ago; they are found anew
+!> when the iterations they cost exceed what finding them does.
+!>
+!> The method is symmetric and symplectic, so that fixed steps keep the energy of an undamped scene for any length of
+!> time. Outputs inside a step are computed by one shorter step from its start. Sums are compensated.
+module rodyn_gauss_integrator
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+   use rodyn_kinds, only: wp, i8
+   use rodyn_lanes, only: s => lanes
+   use rodyn_errors, only: error_type, raise
+   use rodyn_ode, only: ode_system, mechanical_system, stiff_modes
+   use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, time_text
+   use rodyn_trigonometry, only: sine_cosine
+   use rodyn_lane_algebra, only: apply, apply_one, apply_both, project, expand, combine, square_sums, straight_lines, subtract, add
+   use rodyn_gauss_collocation, only: gauss_collocation, new_gauss_collocation
+   implicit none (type, external)
+   private
+   public :: gauss_integrator, new_gauss_integrator
+
+   integer, parameter :: most_iterations = 15
+   real(wp), parameter :: iteration_error = 0.05_wp !! of the tolerance that the iteration may leave
+   real(wp), parameter :: error_constant = 0.5_wp   !! of the error estimate, see `error_estimate`
+   real(wp), parameter :: wanted_estimate = 0.3_wp, largest_estimate = 4.0_wp !! of the error, in tolerances
+   real(wp), parameter :: first_phase = 2.0_wp      !! fastest frequency times the first step
+   real(wp), parameter :: smallest_phase = 0.25_wp  !! slower vibrations need no implicit treatment
+   real(wp), parameter :: search_cost = 40.0_wp     !! finding modes, in iterations
+
+   !> The matrices of one step length.
+   type :: step_matrices
+      real(wp) :: h = 0.0_wp                 !! step [s]
+      real(wp) :: h_a(s, s) = 0.0_wp         !! h A
+      real(wp) :: h2_a2(s, s) = 0.0_wp       !! h^2 A^2
+      real(wp), allocatable :: g(:, :, :)    !! -G of each mode (s, s, n)
+      real(wp) :: h_last = 0.0_wp            !! step that `ahead` extrapolates from [s]
+      real(wp) :: ahead(s, s) = 0.0_wp       !! node values of that step to those of this one
+   end type step_matrices
+
+   !> What is kept of a step.
+   type :: step_record
+      real(wp), allocatable :: f(:, :)       !! F (s, n_dof)
+      real(wp), allocatable :: a(:, :)       !! last accelerations (s, n_dof)
+      real(wp), allocatable :: q(:, :), p(:, :) !! at the nodes (s, n_dof)
+      real(wp), allocatable :: smooth(:, :)  !! accelerations without the stiff part (s, n_dof)
+      real(wp) :: h = 0.0_wp                 !! step [s]
+   end type step_record
+
+   type, extends(integrator_type) :: gauss_integrator
+      private
+      class(mechanical_system), pointer :: mechanics => null() !! `system`, known to be mechanical
+      type(gauss_collocation) :: rule
+      type(stiff_modes) :: modes
+      type(step_matrices), allocatable :: now, spare      !! for the step in hand; for steps to outputs
+      type(step_record) :: last, trial       !! the last accepted step, the one being tried
+      real(wp), allocatable :: modal(:, :), reply(:, :) !! workspace (s, modes)
+      real(wp), allocatable :: guess(:, :)   !! workspace (s, n_dof)
+      real(wp), allocatable :: weight(:)     !! 1/tolerance of the rates (n_dof)
+      real(wp), allocatable :: y(:), lost(:) !! state at t, and what rounding took from it (n_states)
+      real(wp), allocatable :: y_before(:)   !! state at t_before
+      real(wp), allocatable :: increment(:)  !! of the step (n_states)
+      real(wp) :: t = 0.0_wp, t_lost = 0.0_wp, t_before = 0.0_wp !! [s]
+      real(wp) :: h = 0.0_wp                 !! next step [s]
+      real(wp) :: t_first = 0.0_wp           !! start of the interval
+      integer(i8) :: n_grid = 0, i_grid = 0  !! fixed steps of the interval; steps done
+      real(wp) :: rate = 0.1_wp              !! contraction of the iteration
+      integer :: iterations = 0, fewest = most_iterations !! of the last step; of any since the modes were found
+      real(wp) :: estimate = 0.0_wp          !! of the error, mean of the last steps; 0: none
+      real(wp) :: excess = 0.0_wp            !! iterations lost since then
+      logical :: has_history = .false.       !! `last` may be extrapolated
+      logical :: refused = .false.           !! the last failure came from the equations
+      type(solver_statistics) :: counts
+   contains
+      procedure :: start
+      procedure :: advance
+      procedure :: statistics
+      procedure :: finalize
+   end type gauss_integrator
+
+contains
+
+   !> Create an integrator for `system`, which must be mechanical and outlive it.
+   subroutine new_gauss_integrator(self, system, options, error)
+      type(gauss_integrator), intent(out) :: self
+      class(ode_system), target, intent(inout) :: system
+      type(solver_options), intent(in) :: options
+      type(error_type), allocatable, intent(out) :: error
+
+      if (options%order /= 0 .and. options%order /= 16) then
+         call raise(error, "order: 'gauss' is of order 16")
+         return
+      end if
+      select type (system)
+      class is (mechanical_system)
+         self%mechanics => system
+      end select
+      if (associated(self%mechanics)) then
+         if (.not. self%mechanics%has_lanes()) nullify (self%mechanics)
+      end if
+      if (.not. associated(self%mechanics)) then
+         call raise(error, "'gauss' cannot integrate this system (joint rotations that are states of their own: dampers = 'exact')")
+         return
+      end if
+      self%system => system
+      self%options = options
+      call new_gauss_collocation(self%rule)
+      allocate (self%now, self%spare)
+      associate (n => system%n_states, m => self%mechanics%n_dof)
+         allocate (self%y(n), self%lost(n), self%y_before(n), self%increment(n), self%weight(m), self%guess(s, m), &
+                   source=0.0_wp)
+         call allocate_record(self%last, m)
+         call allocate_record(self%trial, m)
+      end associate
+      self%counts%last_order = 16
+   end subroutine new_gauss_integrator
+
+   subroutine allocate_record(record, m)
+      type(step_record), intent(inout) :: record
+      integer, intent(in) :: m
+      allocate (record%f(s, m), record%a(s, m), record%q(s, m), record%p(s, m), record%smooth(s, m), source=0.0_wp)
+   end subroutine allocate_record
+
+   !> First start, or exact restart. `set_stop` comes before.
+   subroutine start(self, t, y, error)
+      class(gauss_integrator), intent(inout) :: self
+      real(wp), intent(in) :: t    !! [s]
+      real(wp), intent(in) :: y(:) !! (n_states)
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: fastest
+
+      call self%begin_interval(t, y, error)
+      if (allocated(error)) return
+      self%t = t
+      self%t_before = t
+      self%t_first = t
+      self%t_lost = 0.0_wp
+      if (self%n_starts == 1 .or. any(abs(self%y - y) > 0.0_wp)) then
+         self%y(:) = y
+         self%lost = 0.0_wp
+      end if ! else the run goes on from its own last state, whose lost digits are still known
+      self%has_history = .false.
+      self%i_grid = 0
+      self%n_grid = 0
+      self%now%h = 0.0_wp
+      call search_modes(self, 0.0_wp, error)
+      if (allocated(error)) return
+      associate (span => self%t_stop - t)
+         if (self%options%fixed_step > 0.0_wp) then
+            self%n_grid = max(1_i8, ceiling(span/self%options%fixed_step*(1.0_wp - 4.0_wp*epsilon(1.0_wp)), i8))
+            return
+         end if
+         fastest = 0.0_wp
+         if (self%modes%n > 0) fastest = sqrt(maxval(self%modes%omega_2))
+         self%h = span
+         if (fastest*span > first_phase) self%h = first_phase/fastest
+         if (self%modes%n == 0) self%h = 1.0e-3_wp*span
+         if (self%options%max_step > 0.0_wp) self%h = min(self%h, self%options%max_step)
+      end associate
+      call search_modes(self, self%h, error)
+   end subroutine start
+
+   !> Integrate to exactly t_out.
+   subroutine advance(self, t_out, y, t, error)
+      class(gauss_integrator), intent(inout) :: self
+      real(wp), intent(in) :: t_out !! not after the stop time [s]
+      real(wp), contiguous, intent(out) :: y(:) !! (n_states)
+      real(wp), intent(out) :: t    !! t_out, or the last good time [s]
+      type(error_type), allocatable, intent(out) :: error
+      logical :: ok
+
+      call self%check_target(t_out, error)
+      do while (.not. allocated(error) .and. self%t < t_out)
+         call step(self, error)
+      end do
+      t = self%t
+      y = self%y
+      if (allocated(error) .or. t <= t_out) return
+      call inner_state(self, t_out, y, ok)
+      if (.not. ok) then
+         call raise(error, 'gauss: output at t = '//time_text(t_out)//' s: '//trouble(self))
+         return
+      end if
+      t = t_out
+   end subroutine advance
+
+   !> State inside the last step, by one shorter step from its start whose first guess is that step's own polynomial.
+   subroutine inner_state(self, t_out, y, ok)
+      class(gauss_integrator), intent(inout) :: self
+      real(wp), intent(in) :: t_out
+      real(wp), contiguous, intent(out) :: y(:)
+      logical, intent(out) :: ok
+      real(wp) :: h, rate
+
+      h = t_out - self%t_before
+      call swap_matrices(self%now, self%spare)
+      call set_step(self, h)
+      call set_weights(self, self%y_before)
+      self%trial%f(:, :) = 0.0_wp
+      call apply(self%mechanics%n_dof, self%rule%interpolation(0.0_wp, h/self%last%h), self%last%f, self%trial%f)
+      rate = self%rate
+      call iterate(self, self%t_before, self%y_before, ok)
+      self%rate = rate
+      call form_increment(self, self%t_before, self%y_before)
+      y = self%y_before + self%increment
+      call swap_matrices(self%now, self%spare)
+   end subroutine inner_state
+
+   subroutine swap_matrices(a, b)
+      type(step_matrices), allocatable, intent(inout) :: a, b
+      type(step_matrices), allocatable :: c
+      call move_alloc(a, c)
+      call move_alloc(b, a)
+      call move_alloc(c, b)
+   end subroutine swap_matrices
+
+   !> One accepted step: try, and shorten, until iteration and error allow it.
+   subroutine step(self, error)
+      class(gauss_integrator), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: h, t_new, estimate
+      logical :: ok, rejected
+
+      rejected = .false.
+      call set_weights(self, self%y)
+      do
+         call self%permit_step(error)
+         if (allocated(error)) return
+         if (self%excess > search_cost) call search_modes(self, self%h, error)
+         if (allocated(error)) return
+         call choose_end(self, h, t_new)
+         if (h <= 4.0_wp*spacing(self%t)) then
+            call raise(error, 'gauss at t = '//time_text(self%t)//' s: '//trouble(self))
+            return
+         end if
+         call set_step(self, h)
+         call predict(self, ok)
+         if (ok) call iterate(self, self%t, self%y, ok)
+         estimate = huge(1.0_wp)
+         if (ok) then
+            call form_increment(self, self%t, self%y, estimate)
+            ok = all(ieee_is_finite(self%increment))
+         end if
+         if (self%n_grid > 0) then
+            if (ok) exit
+            call raise(error, 'gauss at t = '//time_text(self%t)//' s: '//trouble(self))
+            return
+         end if
+         if (ok .and. estimate <= largest_estimate) exit
+         self%counts%n_error_test_failures = self%counts%n_error_test_failures + 1
+         self%n_steps = self%n_steps - 1
+         rejected = .true.
+         if (ok) then
+            self%h = h*max(0.3_wp, 0.9_wp*(wanted_estimate/estimate)**(1.0_wp/17.0_wp))
+         else
+            self%counts%n_nonlinear_failures = self%counts%n_nonlinear_failures + 1
+            self%excess = huge(1.0_wp) ! the modes may be to blame
+            self%h = 0.4_wp*h
+         end if
+      end do
+      call accept(self, h, t_new)
+      self%excess = self%excess + real(self%iterations - self%fewest, wp)
+      self%fewest = min(self%fewest, self%iterations)
+      if (self%n_grid == 0) call choose_next(self, h, t_new, estimate, rejected)
+   end subroutine step
+
+   !> Keep the step while it is nearly right: a new one costs new matrices.
+   subroutine choose_next(self, h, t_new, estimate, rejected)
+      class(gauss_integrator), intent(inout) :: self
+      real(wp), intent(in) :: h, t_new, estimate
+      logical, intent(in) :: rejected
+      real(wp) :: factor
+
+      ! The estimate depends on the phase of the vibrations: two steps' mean tells more.
+      self%estimate = sqrt(max(estimate, 1.0e-30_wp)*merge(self%estimate, max(estimate, 1.0e-30_wp), self%estimate > 0.0_wp))
+      factor = min(2.0_wp, (wanted_estimate/self%estimate)**(1.0_wp/17.0_wp))
+      if (self%iterations > 8) factor = min(factor, 0.8_wp)
+      if (rejected) factor = min(factor, 1.0_wp)
+      if (factor > 0.93_wp .and. factor < 1.12_wp) factor = 1.0_wp
+      if (factor < 1.0_wp .or. factor > 1.0_wp) self%estimate = 0.0_wp
+      ! A step cut short by the stop time says little about the next one.
+      if (t_new < self%t_stop .or. h*factor > self%h) self%h = h*factor
+      if (self%options%max_step > 0.0_wp) self%h = min(self%h, self%options%max_step)
+   end subroutine choose_next
+
+   !> The step to try and the time it ends at: on the stop time if that is near, or on the grid of fixed steps.
+   subroutine choose_end(self, h, t_new)
+      class(gauss_integrator), intent(in) :: self
+      real(wp), intent(out) :: h, t_new
+      real(wp) :: left
+
+      if (self%n_grid > 0) then
+         t_new = self%t_first + (self%t_stop - self%t_first)*(real(self%i_grid + 1, wp)/real(self%n_grid, wp))
+         if (self%i_grid + 1 == self%n_grid) t_new = self%t_stop
+         h = (self%t_stop - self%t_first)/real(self%n_grid, wp)
+         return
+      end if
+      h = self%h
+      left = self%t_stop - self%t
+      t_new = self%t_stop
+      if (h >= left) then
+         h = left
+      else if (1.8_wp*h > left) then ! two even steps rather than one and a sliver
+         h = 0.5_wp*left
+         t_new = self%t + (h - self%t_lost)
+      else
+         t_new = self%t + (h - self%t_lost)
+      end if
+   end subroutine choose_end
+
+   !> Find the stiff modes at the present configuration, and what follows from them.
+   subroutine search_modes(self, h, error)
+      class(gauss_integrator), intent(inout) :: self
+      real(wp), intent(in) :: h !! expected step, 0: unknown [s]
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: slowest
+      logical :: ok
+
+      slowest = 0.0_wp
+      if (h > 0.0_wp) slowest = smallest_phase/h
+      call self%mechanics%find_modes(self%y(:self%mechanics%n_dof), slowest, self%modes, ok)
+      self%counts%n_jac = self%counts%n_jac + 1
+      if (.not. ok) then
+         call raise(error, 'gauss at t = '//time_text(self%t)//' s: mass matrix not positive definite')
+         return
+      end if
+      self%excess = 0.0_wp
+      self%fewest = most_iterations
+      self%now%h = 0.0_wp
+      self%spare%h = 0.0_wp
+      if (allocated(self%modal)) deallocate (self%modal, self%reply)
+      allocate (self%modal(s, self%modes%n), self%reply(s, self%modes%n))
+      if (self%has_history) call remove_stiff_part(self, self%last)
+   end subroutine search_modes
+
+   !> Matrices for a step of length h.
+   subroutine set_step(self, h)
+      class(gauss_integrator), intent(inout) :: self
+      real(wp), intent(in) :: h
+      complex(wp) :: x(s/2)
+      integer :: i
+
+      if (h == self%now%h) return
+      self%now%h = h
+      self%now%h_last = 0.0_wp
+      self%now%h_a = h*self%rule%a
+      self%now%h2_a2 = h**2*self%rule%a2
+      if (allocated(self%now%g)) then
+         if (size(self%now%g, 3) /= self%modes%n) deallocate (self%now%g)
+      end if
+      if (.not. allocated(self%now%g)) allocate (self%now%g(s, s, self%modes%n))
+      associate (lambda => self%rule%lambda)
+         do i = 1, self%modes%n
+            x = h*self%modes%damping(i)*lambda + (h**2*self%modes%omega_2(i))*lambda**2
+            self%now%g(:, :, i) = self%rule%function_of_a(-x/(1.0_wp + x))
+         end do
+      end associate
+   end subroutine set_step
+
+   subroutine set_weights(self, y)
+      class(gauss_integrator), intent(inout) :: self
+      real(wp), intent(in) :: y(:)
+      associate (m => self%mechanics%n_dof)
+         self%weight(:) = 1.0_wp/(self%options%atol + self%options%rtol*abs(y(m + 1:2*m)))
+      end associate
+   end subroutine set_weights
+
+   !> First guess of F: extrapolate what is smooth, solve the stiff modes with it.
+   subroutine predict(self, ok)
+      class(gauss_integrator), intent(inout) :: self
+      logical, intent(out) :: ok
+      integer :: m
+
+      m = self%mechanics%n_dof
+      ok = .true.
+      if (.not. self%has_history) then
+         call begin_history(self, ok)
+         if (.not. ok) return
+      end if
+      self%trial%f(:, :) = 0.0_wp
+      if (self%now%h_last /= self%last%h) then
+         self%now%h_last = self%last%h
+         self%now%ahead = self%rule%interpolation(1.0_wp, self%now%h/self%last%h)
+      end if
+      call apply(m, self%now%ahead, self%last%smooth, self%trial%f)
+      call straight_lines(m, self%y, self%y(m + 1:), self%now%h, self%rule%c, self%trial%q)
+      call straight_lines(m, self%y(m + 1:), self%y(m + 1:), 0.0_wp, self%rule%c, self%trial%p)
+      call stiff_rates(self, self%trial%q, self%trial%p)
+      self%modal = -self%modal
+      call expand(m, self%modes%n, self%modes%u, self%modal, self%trial%f) ! the residual for F = 0
+      call answer(self, self%trial%f)
+   end subroutine predict
+
+   !> Before the first step: the smooth part is taken to be constant.
+   subroutine begin_history(self, ok)
+      class(gauss_integrator), intent(inout) :: self
+      logical, intent(out) :: ok
+
+      associate (m => self%mechanics%n_dof)
+         self%last%q(:, :) = spread(self%y(:m), 1, s)
+         self%last%p(:, :) = spread(self%y(m + 1:2*m), 1, s)
+      end associate
+      call self%mechanics%lane_accelerations(spread(self%t, 1, s), self%last%q, self%last%p, self%last%a, ok)
+      self%refused = .not. ok
+      self%counts%n_rhs = self%counts%n_rhs + 1
+      if (.not. ok) return
+      call remove_stiff_part(self, self%last)
+      self%last%h = self%now%h
+      self%has_history = .true.
+   end subroutine begin_history
+
+   !> smooth = a + sum u (omega^2 v.Q + damping v.P).
+   subroutine remove_stiff_part(self, record)
+      class(gauss_integrator), intent(inout) :: self
+      type(step_record), intent(inout) :: record
+      call stiff_rates(self, record%q, record%p)
+      record%smooth(:, :) = record%a
+      call expand(self%mechanics%n_dof, self%modes%n, self%modes%u, self%modal, record%smooth)
+   end subroutine remove_stiff_part
+
+   !> modal = omega^2 v.Q + damping v.P.
+   subroutine stiff_rates(self, q, p)
+      class(gauss_integrator), intent(inout) :: self
+      real(wp), contiguous, intent(in) :: q(:, :), p(:, :)
+      integer :: i
+
+      associate (n => self%modes%n, m => size(q, 2))
+         call project(m, n, self%modes%v, q, self%modal)
+         call project(m, n, self%modes%v, p, self%reply)
+         do i = 1, n
+            self%modal(:, i) = self%modes%omega_2(i)*self%modal(:, i) + self%modes%damping(i)*self%reply(:, i)
+         end do
+      end associate
+   end subroutine stiff_rates
+
+   !> R becomes dF = R - sum u G R.v.
+   subroutine answer(self, r)
+      class(gauss_integrator), intent(inout) :: self
+      real(wp), contiguous, intent(inout) :: r(:, :)
+
+      associate (n => self%modes%n, m => size(r, 2))
+         call project(m, n, self%modes%v, r, self%modal)
+         call combine(n, self%now%g, self%modal, self%reply)
+         call expand(m, n, self%modes%u, self%reply, r)
+      end associate
+   end subroutine answer
+
+   !> Solve for F of `trial` from its first guess. Leaves Q, P and accelerations of the last evaluation there.
+   subroutine iterate(self, t, y, ok)
+      class(gauss_integrator), intent(inout) :: self
+      real(wp), contiguous, intent(in) :: y(:)
+      real(wp), intent(in) :: t
+      logical, intent(out) :: ok
+      real(wp) :: change, before, times(s)
+      integer :: j, m
+
+      m = self%mechanics%n_dof
+      before = 0.0_wp
+      times = t + self%now%h*self%rule%c
+      call nodes_from(self, y)
+      do j = 1, most_iterations
+         self%iterations = j
+         call self%mechanics%lane_accelerations(times, self%trial%q, self%trial%p, self%trial%a, ok)
+         self%counts%n_rhs = self%counts%n_rhs + s
+         self%refused = .not. ok
+         if (.not. ok) return
+         call subtract(m, self%trial%a, self%trial%f, self%guess)
+         call answer(self, self%guess)
+         call add(m, self%guess, self%trial%f)
+         change = self%now%h*weighted_norm(self%guess, self%weight)
+         if (.not. ieee_is_finite(change)) exit
+         if (j > 1) then
+            if (change > 0.5_wp*before) then ! no progress: at the level of rounding, or hopeless
+               ok = change <= max(0.1_wp, rounding(self, y))
+               if (ok .or. (j > 4 .and. change > 2.0_wp*before)) return
+            end if
+            self%rate = min(1.0_wp, max(1.0e-4_wp, change/before))
+         end if
+         if (self%rate*change <= iteration_error) return
+         call apply_both(m, self%now%h_a, self%now%h2_a2, self%guess, self%trial%p, self%trial%q)
+         before = change
+      end do
+      ok = .false.
+   end subroutine iterate
+
+   !> What rounding leaves of a correction, in tolerances: that of F, and that of Q, which F must balance.
+   real(wp) function rounding(self, y)
+      class(gauss_integrator), intent(in) :: self
+      real(wp), intent(in) :: y(:)
+      associate (m => self%mechanics%n_dof, h => self%now%h)
+         rounding = 64.0_wp*epsilon(1.0_wp)*(h*weighted_norm(self%trial%f, self%weight) + &
+                                             norm2(y(:m)*self%weight)/(h*sqrt(real(m, wp))))
+      end associate
+   end function rounding
+
+   !> P = p + h A F,  Q = q + c h p + h^2 A^2 F.
+   subroutine nodes_from(self, y)
+      class(gauss_integrator), intent(inout) :: self
+      real(wp), contiguous, intent(in) :: y(:)
+      integer :: m
+
+      m = self%mechanics%n_dof
+      call straight_lines(m, y, y(m + 1:), self%now%h, self%rule%c, self%trial%q)
+      call straight_lines(m, y(m + 1:), y(m + 1:), 0.0_wp, self%rule%c, self%trial%p)
+      call apply_both(m, self%now%h_a, self%now%h2_a2, self%trial%f, self%trial%p, self%trial%q)
+   end subroutine nodes_from
+
+   !> Root mean square of weighted values over nodes and unknowns.
+   pure real(wp) function weighted_norm(x, weight)
+      real(wp), contiguous, intent(in) :: x(:, :) !! (s, n_dof)
+      real(wp), intent(in) :: weight(:)
+      weighted_norm = sqrt(sum(square_sums(size(weight), x, weight))/real(size(x), wp))
+   end function weighted_norm
+
+   !> Increment of all states over the step; and an estimate of its error in units of the tolerance.
+   !>
+   !> F is a polynomial with Legendre coefficients C_0..C_7; the increments are h C_0 and h p + h^2 (C_0/2 - C_1/6).
+   !> A vibration of frequency omega has C_k ~ (h omega)^k, and its error over the step is ~ (h omega)^17. The last
+   !> coefficients are those of the fastest vibration that matters; how fast it is shows in how they fall off:
+   !>     error ~ constant h |C_7, C_6| (|C_7, C_6|/|C_5, C_4|)^4.5.
+   subroutine form_increment(self, t, y, estimate)
+      class(gauss_integrator), intent(inout) :: self
+      real(wp), contiguous, intent(in) :: y(:)
+      real(wp), intent(in) :: t !! at the start of the step
+      real(wp), intent(out), optional :: estimate
+      real(wp) :: sums(s), high, low
+      integer :: j, m
+
+      m = self%mechanics%n_dof
+      call legendre_coefficients(self, self%guess)
+      sums = square_sums(m, self%guess, self%weight)
+      associate (h => self%now%h)
+         do j = 1, m
+            self%increment(m + j) = h*self%guess(1, j)
+            self%increment(j) = h*(y(m + j) + h*(0.5_wp*self%guess(1, j) - self%guess(2, j)/6.0_wp))
+         end do
+      end associate
+      if (self%mechanics%turning) call turn_displacement(self, y)
+      if (size(y) > 2*m) call add_quadratures(self, t, self%increment(2*m + 1:))
+      if (.not. present(estimate)) return
+      high = sums(8) + sums(7)
+      low = sums(6) + sums(5)
+      estimate = 0.0_wp
+      if (high > 0.0_wp) estimate = error_constant*self%now%h*sqrt(high/real(m, wp))*min(1.0_wp, high/low)**2.25_wp
+   end subroutine form_increment
+
+   !> Coefficients of F in shifted Legendre polynomials, one polynomial to a lane.
+   subroutine legendre_coefficients(self, coefficient)
+      class(gauss_integrator), intent(in) :: self
+      real(wp), contiguous, intent(out) :: coefficient(:, :) !! (s, n_dof)
+      coefficient = 0.0_wp
+      call apply(size(coefficient, 2), self%rule%coefficients, self%trial%f, coefficient)
+   end subroutine legendre_coefficients
+
+   !> Displacement of C along axes that turn. As a complex number u' = V - i w u, so with theta the turn since the start
+   !> of the step, u exp(i theta) = u_0 + integral of V exp(i theta).
+   subroutine turn_displacement(self, y)
+      class(gauss_integrator), intent(inout) :: self
+      real(wp), intent(in) :: y(:)
+      real(wp), dimension(s + 1) :: theta, sine, cosine !! at the nodes; half the turn of the step
+      real(wp) :: x, v, cos_end, sin_end
+
+      associate (p => self%trial%p, h => self%now%h, b => self%rule%b)
+         theta(:s) = 0.0_wp
+         call apply_one(self%now%h_a, p(:, 3), theta(:s))
+         theta(s + 1) = 0.5_wp*self%increment(3)
+         call sine_cosine(s + 1, theta, sine, cosine)
+         x = h*sum(b*(p(:, 1)*cosine(:s) - p(:, 2)*sine(:s)))
+         v = h*sum(b*(p(:, 1)*sine(:s) + p(:, 2)*cosine(:s)))
+         cos_end = -2.0_wp*sine(s + 1)**2 ! cos(theta) - 1 at the end
+         sin_end = 2.0_wp*sine(s + 1)*cosine(s + 1)
+         self%increment(1) = x + ((y(1) + x)*cos_end + (y(2) + v)*sin_end)
+         self%increment(2) = v + ((y(2) + v)*cos_end - (y(1) + x)*sin_end)
+      end associate
+   end subroutine turn_displacement
+
+   !> Integrals of the states behind (q, p).
+   subroutine add_quadratures(self, t, increment)
+      class(gauss_integrator), intent(inout) :: self
+      real(wp), intent(in) :: t
+      real(wp), intent(out) :: increment(:)
+      real(wp) :: rate(size(increment)), q(self%mechanics%n_dof), p(self%mechanics%n_dof)
+      integer :: i
+      increment = 0.0_wp
+      do i = 1, s
+         q = self%trial%q(i, :)
+         p = self%trial%p(i, :)
+         call self%mechanics%quadratures(t + self%now%h*self%rule%c(i), q, p, rate)
+         increment = increment + self%now%h*self%rule%b(i)*rate
+      end do
+   end subroutine add_quadratures
+
+   !> Make the trial the last step, and keep the digits that rounding takes from the state.
+   subroutine accept(self, h, t_new)
+      class(gauss_integrator), intent(inout) :: self
+      real(wp), intent(in) :: h, t_new
+      real(wp) :: y_new
+      integer :: i
+
+      call remove_stiff_part(self, self%trial)
+      self%trial%h = h
+      call swap_records(self%last, self%trial)
+      do i = 1, size(self%y)
+         self%y_before(i) = self%y(i)
+         y_new = self%y(i) + (self%increment(i) - self%lost(i))
+         self%lost(i) = (y_new - self%y(i)) - (self%increment(i) - self%lost(i))
+         self%y(i) = y_new
+      end do
+      self%t_before = self%t
+      self%t_lost = (t_new - self%t) - (h - self%t_lost)
+      if (t_new >= self%t_stop .or. self%n_grid > 0) self%t_lost = 0.0_wp
+      self%t = t_new
+      self%t_good = t_new
+      self%i_grid = self%i_grid + 1
+      self%counts%last_step = h
+   end subroutine accept
+
+   subroutine swap_records(a, b)
+      type(step_record), intent(inout) :: a, b
+      real(wp) :: h
+      call swap(a%f, b%f)
+      call swap(a%a, b%a)
+      call swap(a%q, b%q)
+      call swap(a%p, b%p)
+      call swap(a%smooth, b%smooth)
+      h = a%h
+      a%h = b%h
+      b%h = h
+   end subroutine swap_records
+
+   subroutine swap(a, b)
+      real(wp), allocatable, intent(inout) :: a(:, :), b(:, :)
+      real(wp), allocatable :: c(:, :)
+      call move_alloc(a, c)
+      call move_alloc(b, a)
+      call move_alloc(c, b)
+   end subroutine swap
+
+   !> What stands in the way of a step.
+   function trouble(self) result(text)
+      class(gauss_integrator), intent(in) :: self
+      character(len=:), allocatable :: text
+      if (self%refused) then
+         text = 'the right-hand side could not be evaluated (mass matrix not positive definite, or not finite)'
+      else
+         text = 'the iteration for the stages does not converge, or no step is small enough'
+      end if
+   end function trouble
+
+   !> Counts over the whole run.
+   function statistics(self) result(stats)
+      class(gauss_integrator), intent(inout) :: self
+      type(solver_statistics) :: stats
+      stats = self%counts
+      stats%n_steps = self%n_steps
+      stats%n_starts = self%n_starts
+   end function statistics
+
+   !> Nothing is held outside Fortran.
+   subroutine finalize(self)
+      class(gauss_integrator), intent(inout) :: self
+      nullify (self%system, self%mechanics, self%monitor)
+   end subroutine finalize
+
+end module rodyn_gauss_integrator

@@ -1,0 +1,234 @@
+!> Small linear algebra on values at all lanes, x(lanes, n): each operation on a lane vector is one vector instruction.
+!>
+!> The lanes stand in explicit shapes, so that the compiler knows their number.
+module rodyn_lane_algebra
+   use rodyn_kinds, only: wp
+   use rodyn_lanes, only: s => lanes
+   implicit none (type, external)
+   private
+   public :: apply, apply_one, apply_both, project, expand, combine, square_sums, straight_lines, subtract, add
+
+contains
+
+   !> y(:, j) = y(:, j) + A x(:, j).
+   pure subroutine apply(n, a, x, y)
+      integer, intent(in) :: n
+      real(wp), intent(in) :: a(s, s), x(s, n)
+      real(wp), intent(inout) :: y(s, n)
+      real(wp), dimension(s) :: y_1, y_2, y_3
+      integer :: i, j, l
+      do j = 1, n - 2, 3
+         y_1 = y(:, j)
+         y_2 = y(:, j + 1)
+         y_3 = y(:, j + 2)
+         do i = 1, s
+            !$omp simd
+            do l = 1, s
+               y_1(l) = y_1(l) + a(l, i)*x(i, j)
+               y_2(l) = y_2(l) + a(l, i)*x(i, j + 1)
+               y_3(l) = y_3(l) + a(l, i)*x(i, j + 2)
+            end do
+         end do
+         y(:, j) = y_1
+         y(:, j + 1) = y_2
+         y(:, j + 2) = y_3
+      end do
+      do j = n - modulo(n, 3) + 1, n
+         call apply_one(a, x(:, j), y(:, j))
+      end do
+   end subroutine apply
+
+   !> y = y + A x. Two sums, since each addition waits for the one before.
+   pure subroutine apply_one(a, x, y)
+      real(wp), intent(in) :: a(s, s), x(s)
+      real(wp), intent(inout) :: y(s)
+      real(wp) :: sum_1(s), sum_2(s)
+      integer :: i
+      sum_1 = y
+      sum_2 = 0.0_wp
+      do i = 1, s, 2
+         sum_1 = sum_1 + a(:, i)*x(i)
+         sum_2 = sum_2 + a(:, i + 1)*x(i + 1)
+      end do
+      y = sum_1 + sum_2
+   end subroutine apply_one
+
+   !> y(:, j) = y(:, j) + A x(:, j) and z(:, j) = z(:, j) + B x(:, j).
+   pure subroutine apply_both(n, a, b, x, y, z)
+      integer, intent(in) :: n
+      real(wp), intent(in) :: a(s, s), b(s, s), x(s, n)
+      real(wp), intent(inout) :: y(s, n), z(s, n)
+      real(wp), dimension(s) :: y_1, y_2, z_1, z_2
+      integer :: i, j, l
+      do j = 1, n - 1, 2 ! two columns at a time stay in registers
+         y_1 = y(:, j)
+         y_2 = y(:, j + 1)
+         z_1 = z(:, j)
+         z_2 = z(:, j + 1)
+         do i = 1, s
+            !$omp simd
+            do l = 1, s
+               y_1(l) = y_1(l) + a(l, i)*x(i, j)
+               y_2(l) = y_2(l) + a(l, i)*x(i, j + 1)
+               z_1(l) = z_1(l) + b(l, i)*x(i, j)
+               z_2(l) = z_2(l) + b(l, i)*x(i, j + 1)
+            end do
+         end do
+         y(:, j) = y_1
+         y(:, j + 1) = y_2
+         z(:, j) = z_1
+         z(:, j + 1) = z_2
+      end do
+      if (modulo(n, 2) == 0) return
+      call apply_one(a, x(:, n), y(:, n))
+      call apply_one(b, x(:, n), z(:, n))
+   end subroutine apply_both
+
+   !> z(:, i) = sum_j v(j, i) x(:, j). Four sums at a time stay in registers.
+   pure subroutine project(n, m, v, x, z)
+      integer, intent(in) :: n, m
+      real(wp), intent(in) :: v(n, m), x(s, n)
+      real(wp), intent(out) :: z(s, m)
+      real(wp), dimension(s) :: sum_1, sum_2, sum_3, sum_4
+      integer :: i, j, l, single
+
+      single = mod(m, 4)
+      do i = 1, single
+         sum_1 = 0.0_wp
+         do j = 1, n
+            !$omp simd
+            do l = 1, s
+               sum_1(l) = sum_1(l) + v(j, i)*x(l, j)
+            end do
+         end do
+         z(:, i) = sum_1
+      end do
+      do i = single + 1, m, 4
+         sum_1 = 0.0_wp
+         sum_2 = 0.0_wp
+         sum_3 = 0.0_wp
+         sum_4 = 0.0_wp
+         do j = 1, n
+            !$omp simd
+            do l = 1, s
+               sum_1(l) = sum_1(l) + v(j, i)*x(l, j)
+               sum_2(l) = sum_2(l) + v(j, i + 1)*x(l, j)
+               sum_3(l) = sum_3(l) + v(j, i + 2)*x(l, j)
+               sum_4(l) = sum_4(l) + v(j, i + 3)*x(l, j)
+            end do
+         end do
+         z(:, i) = sum_1
+         z(:, i + 1) = sum_2
+         z(:, i + 2) = sum_3
+         z(:, i + 3) = sum_4
+      end do
+   end subroutine project
+
+   !> x(:, j) = x(:, j) + sum_i u(i, j) z(:, i).
+   pure subroutine expand(n, m, u, z, x)
+      integer, intent(in) :: n, m
+      real(wp), intent(in) :: u(m, n), z(s, m)
+      real(wp), intent(inout) :: x(s, n)
+      real(wp), dimension(s) :: sum_1, sum_2, sum_3, sum_4
+      integer :: i, j, l, single
+
+      single = mod(n, 4)
+      do j = 1, single
+         sum_1 = x(:, j)
+         do i = 1, m
+            !$omp simd
+            do l = 1, s
+               sum_1(l) = sum_1(l) + u(i, j)*z(l, i)
+            end do
+         end do
+         x(:, j) = sum_1
+      end do
+      do j = single + 1, n, 4
+         sum_1 = x(:, j)
+         sum_2 = x(:, j + 1)
+         sum_3 = x(:, j + 2)
+         sum_4 = x(:, j + 3)
+         do i = 1, m
+            !$omp simd
+            do l = 1, s
+               sum_1(l) = sum_1(l) + u(i, j)*z(l, i)
+               sum_2(l) = sum_2(l) + u(i, j + 1)*z(l, i)
+               sum_3(l) = sum_3(l) + u(i, j + 2)*z(l, i)
+               sum_4(l) = sum_4(l) + u(i, j + 3)*z(l, i)
+            end do
+         end do
+         x(:, j) = sum_1
+         x(:, j + 1) = sum_2
+         x(:, j + 2) = sum_3
+         x(:, j + 3) = sum_4
+      end do
+   end subroutine expand
+
+   !> y = sum_i matrices(:, :, i) z(:, i), each column by a matrix of its own.
+   pure subroutine combine(m, matrices, z, y)
+      integer, intent(in) :: m
+      real(wp), intent(in) :: matrices(s, s, m), z(s, m)
+      real(wp), intent(out) :: y(s, m)
+      real(wp) :: y_1(s), y_2(s)
+      integer :: i, j, l
+      do i = 1, m - 1, 2
+         y_1 = 0.0_wp
+         y_2 = 0.0_wp
+         do j = 1, s
+            !$omp simd
+            do l = 1, s
+               y_1(l) = y_1(l) + matrices(l, j, i)*z(j, i)
+               y_2(l) = y_2(l) + matrices(l, j, i + 1)*z(j, i + 1)
+            end do
+         end do
+         y(:, i) = y_1
+         y(:, i + 1) = y_2
+      end do
+      if (modulo(m, 2) == 0) return
+      y(:, m) = 0.0_wp
+      call apply_one(matrices(:, :, m), z(:, m), y(:, m))
+   end subroutine combine
+
+   !> Lane by lane, sum of (weight_j x(:, j))^2.
+   pure function square_sums(n, x, weight) result(sums)
+      integer, intent(in) :: n
+      real(wp), intent(in) :: x(s, n), weight(n)
+      real(wp) :: sums(s)
+      integer :: j, l
+      sums = 0.0_wp
+      do j = 1, n
+         !$omp simd
+         do l = 1, s
+            sums(l) = sums(l) + (x(l, j)*weight(j))**2
+         end do
+      end do
+   end function square_sums
+
+   !> Uniform motion from q at the rate p: x(:, j) = q_j + h p_j c.
+   pure subroutine straight_lines(n, q, p, h, c, x)
+      integer, intent(in) :: n
+      real(wp), intent(in) :: q(n), p(n), h, c(s)
+      real(wp), intent(out) :: x(s, n)
+      integer :: j
+      do j = 1, n
+         x(:, j) = q(j) + (h*p(j))*c
+      end do
+   end subroutine straight_lines
+
+   !> z = x - y.
+   pure subroutine subtract(n, x, y, z)
+      integer, intent(in) :: n
+      real(wp), intent(in) :: x(s, n), y(s, n)
+      real(wp), intent(out) :: z(s, n)
+      z = x - y
+   end subroutine subtract
+
+   !> y = y + x.
+   pure subroutine add(n, x, y)
+      integer, intent(in) :: n
+      real(wp), intent(in) :: x(s, n)
+      real(wp), intent(inout) :: y(s, n)
+      y = y + x
+   end subroutine add
+
+end module rodyn_lane_algebra

@@ -1,0 +1,218 @@
+!> The collocation method of order 16: against another method, its order, its tolerance, long times, what it refuses.
+module test_gauss
+   use rodyn_kinds, only: wp
+   use rodyn_errors, only: error_type
+   use rodyn_case_config, only: case_config
+   use rodyn_lanes, only: lanes
+   use rodyn_gauss_collocation, only: gauss_collocation, new_gauss_collocation
+   use test_testing, only: unittest, new_test, check, check_close
+   use test_random_scenes, only: random_case, seed_random, kind_name, n_kinds
+   use rodyn_case_reader, only: read_case
+   use test_trajectories, only: trajectory, integrate
+   implicit none (type, external)
+   private
+   public :: collect_gauss
+
+contains
+
+   subroutine collect_gauss(suite)
+      type(unittest), allocatable, intent(out) :: suite(:)
+      suite = [ &
+         new_test('collocation matrices integrate, interpolate and have the right functions', test_matrices), &
+         new_test('every kind of scene moves as by dop853', test_kinds), &
+         new_test('fixed steps show order 16', test_order), &
+         new_test('the error follows the tolerance over nine decades', test_tolerance), &
+         new_test('large fixed steps keep the energy for thousands of periods', test_energy), &
+         new_test('steps far beyond the stiffest vibration keep the slow motion', test_stiff), &
+         new_test('relaxing joints are refused by name', test_refused)]
+   end subroutine collect_gauss
+
+   !> Powers of x up to the degree where each must be exact.
+   subroutine test_matrices(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(gauss_collocation) :: rule
+      complex(wp), allocatable :: one(:)
+      real(wp) :: ahead(lanes, lanes), unity(lanes, lanes)
+      integer :: i, k
+
+      call new_gauss_collocation(rule)
+      ahead = rule%interpolation(1.0_wp, 0.5_wp)
+      do k = 0, lanes - 1
+         call check_close(error, matmul(rule%a, rule%c**k), rule%c**(k + 1)/(k + 1), 1.0e-15_wp, 'A')
+         if (allocated(error)) return
+         call check_close(error, matmul(ahead, rule%c**k), (1.0_wp + 0.5_wp*rule%c)**k, 2.0e-11_wp, 'interpolation')
+         if (allocated(error)) return
+      end do
+      do k = 0, 2*lanes - 1
+         call check_close(error, [sum(rule%b*rule%c**k)], [1.0_wp/(k + 1)], 1.0e-15_wp, 'b')
+         if (allocated(error)) return
+      end do
+      ! 1/(1 + 9 A^2) through the eigenvalues, against its definition.
+      one = 1.0_wp/(1.0_wp + 9.0_wp*rule%lambda**2)
+      unity = matmul(rule%function_of_a(one), 9.0_wp*matmul(rule%a, rule%a)) + rule%function_of_a(one)
+      do i = 1, lanes
+         unity(i, i) = unity(i, i) - 1.0_wp
+      end do
+      call check(error, maxval(abs(unity)) < 1.0e-9_wp, 'function of A')
+   end subroutine test_matrices
+
+   subroutine test_kinds(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+      type(trajectory) :: motion, other
+      integer :: which, i
+
+      call seed_random(161)
+      do which = 1, n_kinds
+         if (index(kind_name(which), 'exact') > 0) cycle ! joints of their own
+         call random_case(config, which, 4)
+         config%chain%bending_stiffness = 100.0_wp*config%chain%bending_stiffness
+         config%solver%rtol = 1.0e-13_wp
+         config%solver%atol = 1.0e-14_wp
+         config%solver%method = 'gauss'
+         call integrate(config, [0.01_wp, 0.05_wp], motion, error)
+         if (allocated(error)) return
+         config%solver%method = 'dop853'
+         call integrate(config, [0.01_wp, 0.05_wp], other, error)
+         if (allocated(error)) return
+         do i = 1, 2
+            associate (a => motion%rows(i), b => other%rows(i))
+               call check_close(error, [a%displacement_x, a%displacement_y, a%rotation, a%phi], &
+                                [b%displacement_x, b%displacement_y, b%rotation, b%phi], 1.0e-8_wp, kind_name(which))
+               if (allocated(error)) return
+               call check_close(error, [a%work_external, a%energy_dissipated], [b%work_external, b%energy_dissipated], &
+                                1.0e-8_wp*(1.0_wp + abs(b%work_external) + b%energy_dissipated), kind_name(which)//' ledger')
+               if (allocated(error)) return
+            end associate
+         end do
+      end do
+   end subroutine test_kinds
+
+   !> Errors of alpha' at 0.1 s of table 1 with fixed steps of 5.6, 4.7 and 3.8 in phase of the fastest vibration.
+   subroutine test_order(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+      type(trajectory) :: exact, motion
+      integer, parameter :: n_steps(3) = [50, 60, 74]
+      real(wp) :: e(3)
+      integer :: i
+
+      call table1_case(config, error)
+      if (allocated(error)) return
+      config%solver%method = 'dop853'
+      call integrate(config, [0.1_wp], exact, error)
+      if (allocated(error)) return
+      config%solver%method = 'gauss'
+      do i = 1, 3
+         config%solver%fixed_step = 0.1_wp/n_steps(i)
+         call integrate(config, [0.1_wp], motion, error)
+         if (allocated(error)) return
+         e(i) = norm2(motion%rows(1)%alpha_rate - exact%rows(1)%alpha_rate)
+      end do
+      associate (order => log(e(:2)/e(2:))/log(real(n_steps(2:), wp)/real(n_steps(:2), wp)))
+         call check(error, all(abs(order - 16.0_wp) < 1.0_wp), 'observed order')
+      end associate
+   end subroutine test_order
+
+   subroutine test_tolerance(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+      type(trajectory) :: exact, motion
+      real(wp) :: ratio(9)
+      integer :: i
+
+      call table1_case(config, error)
+      if (allocated(error)) return
+      config%solver%method = 'dop853'
+      call integrate(config, [0.25_wp], exact, error)
+      if (allocated(error)) return
+      config%solver%method = 'gauss'
+      do i = 1, 9
+         config%solver%rtol = 10.0_wp**(-2 - i)
+         config%solver%atol = 0.01_wp*config%solver%rtol
+         call integrate(config, [0.25_wp], motion, error)
+         if (allocated(error)) return
+         ratio(i) = maxval(abs(motion%rows(1)%alpha_rate - exact%rows(1)%alpha_rate))/config%solver%rtol
+      end do
+      call check(error, maxval(ratio) < 20.0_wp .and. minval(ratio) > 0.02_wp, 'error over tolerance')
+   end subroutine test_tolerance
+
+   !> Free, undamped vibration of one flexible rod on a spacecraft, thousands of its fastest periods.
+   subroutine test_energy(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+      type(trajectory) :: motion
+      integer :: i
+
+      call table1_case(config, error)
+      if (allocated(error)) return
+      deallocate (config%loads)
+      config%chain%hinge_damping = 0.0_wp
+      config%initial%phi_rate = [0.1_wp, -0.2_wp, 0.3_wp, 0.1_wp]
+      config%initial%alpha_rate = 0.5_wp
+      config%output%ledger = .true.
+      config%solver%method = 'gauss'
+      config%solver%fixed_step = 1.0e-3_wp
+      call integrate(config, [(0.5_wp*i, i=0, 10)], motion, error)
+      if (allocated(error)) return
+      do i = 1, size(motion%rows)
+         associate (row => motion%rows(i), first => motion%rows(1))
+            call check_close(error, row%energy_residual/(first%energy_kinetic + first%energy_elastic), 0.0_wp, 2.0e-12_wp, 'energy')
+            if (allocated(error)) return
+         end associate
+      end do
+   end subroutine test_energy
+
+   !> Bending 100 times stiffer than it is, and steps of 56 in phase: the iteration converges, the fast vibrations are
+   !> not resolved, and the slow motion is right all the same.
+   subroutine test_stiff(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+      type(trajectory) :: exact, motion
+
+      call table1_case(config, error)
+      if (allocated(error)) return
+      config%chain%bending_stiffness = 100.0_wp*config%chain%bending_stiffness
+      config%solver%method = 'dop853'
+      call integrate(config, [0.2_wp], exact, error)
+      if (allocated(error)) return
+      config%solver%method = 'gauss'
+      config%solver%rtol = 1.0e-9_wp
+      config%solver%atol = 1.0e-11_wp
+      config%solver%fixed_step = 2.0e-3_wp
+      call integrate(config, [0.2_wp], motion, error)
+      if (allocated(error)) return
+      call check_close(error, motion%rows(1)%phi, exact%rows(1)%phi, 1.0e-5_wp, 'phi')
+   end subroutine test_stiff
+
+   subroutine test_refused(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable :: refusal
+      type(case_config) :: config
+      type(trajectory) :: motion
+
+      call table1_case(config, error)
+      if (allocated(error)) return
+      config%model%inertia = 'lumped'
+      config%model%bending = 'quasistatic'
+      config%model%dampers = 'exact'
+      config%solver%method = 'gauss'
+      call integrate(config, [0.1_wp], motion, refusal)
+      call check(error, allocated(refusal), 'not refused')
+      if (allocated(error)) return
+      call check(error, index(refusal%message, "dampers = 'exact'") > 0, refusal%message)
+   end subroutine test_refused
+
+   !> Table 1 with all inertia terms, at a tight tolerance.
+   subroutine table1_case(config, error)
+      type(case_config), intent(out) :: config
+      type(error_type), allocatable, intent(out) :: error
+      call read_case('cases/table1.nml', config, error=error)
+      if (allocated(error)) return
+      config%model%formulation = 'consistent'
+      config%output%ledger = .false.
+      config%solver%rtol = 1.0e-13_wp
+      config%solver%atol = 1.0e-14_wp
+   end subroutine table1_case
+
+end module test_gauss
