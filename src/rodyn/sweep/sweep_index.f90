@@ -218,7 +218,6 @@ contains
       type(case_result), intent(inout) :: kept !! its arrays are allocated
       type(error_type), allocatable, intent(out) :: error
       integer(i8), allocatable :: words(:)
-      integer(i8) :: length
       integer :: f, stat
 
       f = self%file(case)
@@ -229,20 +228,33 @@ contains
          if (stat /= 0) self%units(f) = 0
          if (stat == 0) self%n_open = self%n_open + 1
       end if
-      if (self%units(f) /= 0) read (self%units(f), pos=self%at(case), iostat=stat) length
-      if (stat == 0 .and. length >= shortest_record .and. 8*length <= self%bytes) then
-         allocate (words(length))
-         read (self%units(f), pos=self%at(case), iostat=stat) words
-         if (stat /= 0) words(:) = 0
-      else
-         allocate (words(1), source=1_i8)
-      end if
-      if (is_sound(words)) then
+      if (self%units(f) /= 0) call read_record(self%units(f), self%at(case), self%bytes/8, words)
+      if (allocated(words)) then
          call decode_record(words, shape, kept)
       else
          call raise(error, self%directory//'/shards/'//trim(self%files(f))//': cannot be read any more; run again')
       end if
    end subroutine fetch
+
+   !> A record from its place in a file; not allocated if it is not as it was when it was verified.
+   subroutine read_record(unit, at, most, words)
+      integer, intent(in) :: unit
+      integer(i8), intent(in) :: at    !! first byte
+      integer(i8), intent(in) :: most  !! words it can have
+      integer(i8), allocatable, intent(out) :: words(:)
+      integer(i8) :: length
+      integer :: stat
+
+      read (unit, pos=at, iostat=stat) length
+      if (stat /= 0) return
+      if (length < shortest_record .or. length > most) return
+      allocate (words(length))
+      read (unit, pos=at, iostat=stat) words
+      if (stat == 0) then
+         if (is_sound(words)) return
+      end if
+      deallocate (words)
+   end subroutine read_record
 
    subroutine close_files(self)
       class(sweep_index), intent(inout) :: self
