@@ -128,7 +128,7 @@ class Campaign:
         ended()
         self.tell(all(equal) and again == 0,
                   f"kill -9 at {killed} random times in {len(equal)} sweeps of 500 cases (in {sum(n > 0 for n in resumed_at)} "
-                  f"of them with results on the disk, {sum(resumed_at)} in all), each resumed to its end: {sum(equal)} byte-equal, "
+                  f"of them with results on the disk, {sum(resumed_at) // killed} on average), each resumed to its end: {sum(equal)} byte-equal, "
                   f"no case missing or doubled; {again} finished cases were integrated again")
 
     def rank_kills(self, times: int = 10) -> None:
@@ -182,8 +182,8 @@ class Campaign:
             redone += content(directory) == wanted and len(after) == 500
             integrated += len(set(after) - before)
         self.tell(noticed == redone == times and (kind == "truncation" or integrated <= times),
-                  f"{kind}, {times} times: {noticed} noticed, {redone} mended to byte-equal data; {integrated} of 500 cases integrated "
-                  f"again in all")
+                  f"{kind}, {times} times: {noticed} noticed, {redone} mended to byte-equal data; {integrated} cases integrated again in "
+                  f"all")
 
     def truncation(self) -> None:
         self.damage("truncation", 20)

@@ -6,6 +6,7 @@ RODYN=path  the program under test; otherwise bin/rodyn.
 import math
 import os
 import pathlib
+import resource
 import shutil
 import signal
 import subprocess
@@ -328,6 +329,21 @@ def test_nothing_is_deleted_by_resuming(here):
     sweep(here, None)
     sealed = {path.name for path in here.glob("s/shards/*.shard")}
     assert {f"{name}.shard" for name in numbers} < sealed and len(sealed) == len(numbers) + 1 == 4
+
+
+def test_a_write_that_fails_leaves_whole_results(here):
+    """As on a full disk: what the last write managed is cut off again, so that nothing is torn."""
+    (here / "s.nml").write_text(SHORT)
+    limit = 100001
+    process = subprocess.run([RODYN, "sweep", "s.nml", "--quiet"], cwd=here, capture_output=True, text=True,
+                             preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))
+    assert process.returncode == 1 and "File too large; run again" in process.stderr
+    (shard,) = here.glob("s/shards/*.open")
+    there = results(here / "s")
+    assert shard.stat().st_size == 24 + sum(len(record) for _, record in there) > 99000
+    result = sweep(here, None)
+    assert result.stderr == "" and f"{len(there)} of them on the disk" in result.stdout
+    assert set(there) < set(results(here / "s"))
 
 
 @pytest.mark.parametrize("damage", ["cut", "odd", "bit", "empty"])

@@ -7,7 +7,7 @@ module rodyn_sweep_mend
    use rodyn_errors, only: error_type, raise
    use rodyn_growing_file, only: growing_file
    use rodyn_posix, only: path_exists
-   use rodyn_posix_files, only: read_words, rename_aside, write_words
+   use rodyn_posix_files, only: file_bytes, read_words, rename_aside, write_words
    use rodyn_sweep_case, only: case_shape
    use rodyn_sweep_journal, only: write_journal
    use rodyn_sweep_notices, only: notice_list
@@ -47,7 +47,7 @@ contains
          if (extent%sealed) return ! it could not be read for a moment
          fault = 'truncated'
       end if
-      if (size(words) == 0 .and. .not. torn .and. left_open) fault = '' ! killed before the first word
+      if (left_open .and. file_bytes(path) == 0) fault = '' ! killed before the first word
       if (len(fault) == 0 .and. .not. path_exists(directory//'/shards/'//sealed_name)) then
          call finish(directory, sealed_name, tag, shard_header(fingerprint), extent, error)
       else
