@@ -48,7 +48,8 @@ contains
          fault = 'truncated'
       end if
       if (left_open .and. file_bytes(path) == 0) fault = '' ! killed before the first word
-      if (len(fault) == 0 .and. .not. path_exists(directory//'/shards/'//sealed_name)) then
+      if (len(fault) == 0 .and. path_exists(directory//'/shards/'//sealed_name)) fault = 'another has its name'
+      if (len(fault) == 0) then
          call finish(directory, sealed_name, tag, shard_header(fingerprint), extent, error)
       else
          call salvage(directory, name, sealed_name, tag, words(:extent%used), extent, error)
