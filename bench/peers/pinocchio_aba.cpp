@@ -9,10 +9,7 @@
 #include <vector>
 
 #include <pinocchio/algorithm/aba.hpp>
-#include <pinocchio/multibody/data.hpp>
-#include <pinocchio/multibody/joint/joint-planar.hpp>
-#include <pinocchio/multibody/joint/joint-revolute.hpp>
-#include <pinocchio/multibody/model.hpp>
+#include <pinocchio/multibody.hpp>
 
 namespace pin = pinocchio;
 
