@@ -29,6 +29,11 @@ def plot(file: str | pathlib.Path, out: str | pathlib.Path, scenes: Sequence[str
     return figure
 
 
+def scene_names(file: str | pathlib.Path) -> list[str]:
+    """Names of the scenes in a benchmark file."""
+    return [scene.name for scene in read_benchmark(file)]
+
+
 def draw(scenes: Sequence[BenchmarkScene]) -> Figure:
     columns = max(len(scene.errors) for scene in scenes)
     figure, grid = style.new_figure(len(scenes), columns, width=style.WIDTH if columns > 1 else 0.7 * style.WIDTH,
