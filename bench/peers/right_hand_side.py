@@ -83,8 +83,8 @@ def with_turn(function: Callable, turn: Callable) -> Callable:
     return types.FunctionType(function.__code__, function.__globals__ | {"turn": turn}, function.__name__)
 
 
-def expressions(scene: Scene, segment: Segment, hinge_factor: Any = None) -> list[tuple[Any, Any]]:
-    """heyoka's system. `hinge_factor` multiplies the stiffness of all hinges, a parameter of ensembles."""
+def expressions(scene: Scene, segment: Segment, hinge_factor: Any = None, base: Any = None) -> list[tuple[Any, Any]]:
+    """heyoka's system. `hinge_factor` multiplies the stiffness of all hinges, `base` replaces the loads on the spacecraft: parameters."""
     import heyoka as hy
 
     n, n_dof, i = scene.n, scene.n_dof, 3 * scene.free
@@ -115,7 +115,7 @@ def expressions(scene: Scene, segment: Segment, hinge_factor: Any = None) -> lis
     inward(n, i, scene.rods, cosine, sine, q, p, moment, tip_e, tip_n, work, out)
     omega_rate = 0.0
     if scene.free:
-        model.spacecraft(scene.body, p, segment.base, moment[0], out, acceleration)
+        model.spacecraft(scene.body, p, segment.base if base is None else base, moment[0], out, acceleration)
         omega_rate = acceleration[2]
     else:
         out[0] = out[1] = 0.0

@@ -15,6 +15,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import datetime
+import hashlib
 import json
 import math
 import os
@@ -138,7 +139,8 @@ class Computation:
 class Benchmark:
     def __init__(self, arguments: argparse.Namespace) -> None:
         self.quick = arguments.quick
-        self.budget = arguments.budget or (2.0 if self.quick else 8.0)
+        self.references = arguments.out.parent / "references"
+        self.budget = arguments.budget or (2.0 if self.quick else 6.0)
         self.rounds = arguments.rounds or (5 if self.quick else 7)
         self.deadline = time.monotonic() + 60.0 * (arguments.minutes or (4.0 if self.quick else 28.0))
         self.wanted = arguments.methods
@@ -186,12 +188,10 @@ class Benchmark:
         start = time.monotonic()
         t_end = read_namelist((HERE / f"{scene}.nml").read_text())["case"][0]["t_end"]
         base = {"scene": scene_path(scene), "probe_times": [float(t) for t in PROBES * t_end], "budget": self.budget}
-        share = (self.deadline - start) / max(1, len(self.scenes) - list(self.results).__len__())
+        share = (self.deadline - start) / (len(self.scenes) - len(self.results))
         end = start + share
         reference, agreement = self.reference(base)
-        computations: list[Computation] = []
-        for line in self.lines(scene):
-            computations += self.explore(line, base, t_end, reference, end - 0.25 * share)
+        computations = self.explore(self.lines(scene), base, t_end, reference, end - 0.25 * share)
         self.repeat(computations, end)
         title = read_namelist((HERE / f"{scene}.nml").read_text())["case"][0]["title"]
         self.attributes[scene] = {"title": title, "t_end": float(t_end), **agreement}
@@ -201,18 +201,26 @@ class Benchmark:
             (f", {agreement['agreement_alpha_rate']:.1e} rad/s" if "agreement_alpha_rate" in agreement else ""))
 
     def reference(self, base: dict[str, Any]) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-        """Two methods that share nothing but the model; the first is the reference, their difference what it is worth."""
+        """Two methods that share nothing but the model where heyoka knows the scene, else two of Rodyn's. The first is the
+        reference, their difference what it is worth. References are kept beside the results, by the text of the scene."""
+        text = pathlib.Path(base["scene"]).read_text()
+        key = hashlib.sha256(json.dumps([text, base["probe_times"], sorted(self.workers)]).encode()).hexdigest()[:16]
+        kept = self.references / f"{pathlib.Path(base['scene']).stem}-{key}.json"
+        if kept.is_file():
+            known = json.loads(kept.read_text())
+            return {k: np.array(v) for k, v in known["reference"].items()}, known["said"]
+        groups = read_namelist(text)
+        n, t_end, stem = groups["chain"][0]["n_rods"], groups["case"][0]["t_end"], pathlib.Path(base["scene"]).stem
+        quadruple = n <= 16 and t_end <= 30 and stem not in ("stiff", "damped")
         found: list[tuple[str, dict[str, np.ndarray]]] = []
-        candidates = [("heyoka, quadruple precision, tolerance 1e-20", "heyoka", {"method": "reference", "rtol": 1e-20}),
+        candidates = [("heyoka in quadruple precision, tolerance 1e-20", "heyoka" if quadruple else "", {"method": "reference", "rtol": 1e-20}),
+                      ("heyoka, tolerance 2.3e-16", "heyoka" if not quadruple and n <= 64 else "", {"method": "heyoka", "rtol": 2.3e-16}),
                       ("dop853, rtol 1e-14", "rodyn", {"method": "dop853", "rtol": 1e-14, "atol": 1e-16}),
                       ("erk 8, rtol 1e-14", "rodyn", {"method": "erk", "order": 8, "rtol": 1e-14, "atol": 1e-16})]
         for name, worker, job in candidates:
             if len(found) == 2 or worker not in self.workers:
                 continue
-            known = read_namelist(pathlib.Path(base["scene"]).read_text())
-            if worker == "heyoka" and (known["chain"][0]["n_rods"] > 16 or known["case"][0]["t_end"] > 10):
-                continue
-            answer = self.workers[worker].ask(base | job | {"budget": 40.0, "repeats": 1}, 60.0)
+            answer = self.workers[worker].ask(base | job | {"budget": 200.0, "repeats": 1}, 240.0)
             if answer["status"] == "done":
                 found.append((name, {key: np.array(answer[key]) for key in ("phi", "alpha_rate")}))
         if not found:
@@ -222,38 +230,44 @@ class Benchmark:
             if found[0][1][key].size:
                 difference = np.abs(found[0][1][key] - found[1][1][key]).max() if len(found) > 1 else math.nan
                 said[f"agreement_{key}"] = float(difference)
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        kept.write_text(json.dumps({"reference": {k: v.tolist() for k, v in found[0][1].items()}, "said": said}))
         return found[0][1], said
 
-    def explore(self, line: Line, base: dict[str, Any], t_end: float, reference: dict[str, np.ndarray], end: float) -> list[Computation]:
-        """Each tolerance once, from loose to tight, until the next one is expected to exceed the budget."""
-        if line.fixed:
-            steps = [t_end / n for n in self.step_counts(line, base)]
-            jobs = [base | {"rtol": 1e-8, "atol": 1e-10, "fixed_step": h} for h in steps]
+    def explore(self, lines: list[Line], base: dict[str, Any], t_end: float, reference: dict[str, np.ndarray], end: float) -> list[Computation]:
+        """Every line from loose to tight, all lines abreast, each until its next computation is expected to exceed the budget."""
+        rows: dict[Line, list[Computation]] = {}
+        for line in lines:
+            if line.fixed:
+                jobs = [{"rtol": 1e-8, "atol": 1e-10, "fixed_step": t_end / n} for n in self.step_counts(line, base)]
+            else:
+                jobs = [{"rtol": tol, "atol": ATOL * tol} for tol in self.tolerances]
+            rows[line] = [Computation(line, base | job | {"method": line.method, "order": line.order}) for job in jobs]
+        for k in range(max(len(row) for row in rows.values())):
+            for line, row in rows.items():
+                if k < len(row):
+                    self.explore_one(line, row, k, reference, end)
+        known = [row for line, row in rows.items() if not (line.fixed and row[0].message.startswith("fixed_step"))]
+        return [c for row in known for c in row]
+
+    def explore_one(self, line: Line, row: list[Computation], k: int, reference: dict[str, np.ndarray], end: float) -> None:
+        made = row[k]
+        times = [c.seconds[0] for c in row[:k] if c.seconds]
+        expected = times[-1] ** 2 / times[-2] if len(times) > 1 else times[-1] if times else 0.0
+        if k > 0 and row[k - 1].message.startswith(("left out", "stopped", "no answer", "fixed_step", "the worker died")):
+            made.message = "left out: the one before took too long"
+        elif expected > self.budget:
+            made.message = f"left out: expected to take {expected:.0f} s"
+        elif time.monotonic() > end:
+            made.message = "left out: the time of the scene is used up"
+        if made.message:
+            return
+        patience = self.budget + 10.0 + (START_UP if line.worker != "rodyn" else 0.0)
+        answer = self.workers[line.worker].ask(made.job | {"repeats": 1}, patience)
+        if answer["status"] == "done":
+            self.take(made, answer, reference)
         else:
-            jobs = [base | {"rtol": tol, "atol": ATOL * tol} for tol in self.tolerances]
-        computations, times = [], []
-        worker = self.workers[line.worker]
-        for job in jobs:
-            made = Computation(line, job | {"method": line.method, "order": line.order})
-            expected = times[-1] ** 2 / times[-2] if len(times) > 1 else times[-1] if times else 0.0
-            if expected > self.budget:
-                made.message = f"left out: expected to take {expected:.0f} s"
-            elif computations and computations[-1].message.startswith(("left out", "stopped", "no answer")):
-                made.message = "left out: the one before took too long"
-            elif time.monotonic() > end:
-                made.message = "left out: the time of the scene is used up"
-            if not made.message:
-                patience = self.budget + 10.0 + (START_UP if line.worker != "rodyn" else 0.0)
-                answer = worker.ask(made.job | {"repeats": 1}, patience)
-                if answer["status"] == "done":
-                    self.take(made, answer, reference)
-                    times.append(answer["seconds"])
-                else:
-                    made.message = answer["message"]
-                    if line.fixed and "fixed_step" in made.message:
-                        return []  # the method knows no fixed steps
-            computations.append(made)
-        return computations
+            made.message = answer["message"]
 
     def step_counts(self, line: Line, base: dict[str, Any]) -> list[int]:
         """Numbers of fixed steps, doubled from what the same method takes at a loose tolerance."""
@@ -307,9 +321,14 @@ class Benchmark:
                     where = [t for t, r in zip(TARGETS, ratios, strict=True) if np.isfinite(r)]
                     self.figures.append(f"{name}/rodyn best, {scene}, at errors of {key.removeprefix('error_')} from {where[0]:.0e} to "
                                         f"{where[-1]:.0e} {unit}: {text} (geometric mean {geometric_mean(ratios):.2f})")
-            for target, (seconds, name) in zip(TARGETS, rodyn, strict=True):
-                if np.isfinite(seconds):
-                    self.figures.append(f"rodyn best, {scene}, error {target:.0e} {unit}: {1e3 * seconds:.2f} ms ({name})")
+            adaptive = {line: times for line, times in table.items() if not line.fixed}
+            for name, shown in (("rodyn best", table), ("rodyn best adaptive", adaptive), ("heyoka", {k: v for k, v in table.items() if k.worker == "heyoka"})):
+                worker = "heyoka" if name == "heyoka" else "rodyn"
+                best = [(target, *best_of(shown, worker, i)) for i, target in enumerate(TARGETS)]
+                text = ", ".join(f"{1e3 * seconds:.3g} ms ({line})" if worker == "rodyn" else f"{1e3 * seconds:.3g} ms"
+                                 for _, seconds, line in best if np.isfinite(seconds))
+                if text:
+                    self.figures.append(f"{name}, {scene}: {text}")
         with contextlib.suppress(KeyError):
             self.compare_ensembles()
         with contextlib.suppress(KeyError):
@@ -327,28 +346,30 @@ class Benchmark:
             return
         truth = np.array(exact["alpha_rate"])
         curves: dict[str, list[tuple[float, float]]] = {}
-        methods = [m for m in self.names["names"] if m not in ("adams", "bdf")]
-        jobs: dict[tuple[str, float], list[float]] = {}
-        errors: dict[tuple[str, float], float] = {}
-        for _ in range(1 if self.quick else 3):
+        variants = [(m, {"method": m, "rtol": tol, "atol": ATOL * tol}) for m in self.names["names"] if m not in ("adams", "bdf")
+                    for tol in self.tolerances]
+        variants += [("dop853 fixed", {"method": "dop853", "fixed_step": 1.0 / steps}) for steps in (500, 700, 1000, 1400, 2000, 2800, 4000)]
+        jobs: dict[tuple[str, str], list[float]] = {}
+        errors: dict[tuple[str, str], float] = {}
+        for _ in range(3):
             for tol in self.tolerances:
                 answer = heyoka.ask(base | {"method": "batch", "rtol": tol, "hinge_factors": factors, "repeats": 5}, START_UP)
                 if answer["status"] == "done":
-                    jobs.setdefault(("heyoka batch", tol), []).append(answer["seconds"])
-                    errors["heyoka batch", tol] = np.abs(np.array(answer["alpha_rate"]) - truth).max()
-                for method in methods:
-                    answers = [rodyn.ask(base | {"method": method, "rtol": tol, "atol": ATOL * tol, "hinge_factor": f, "repeats": 2}, 60.0)
-                               for f in factors]
-                    if all(a["status"] == "done" for a in answers):
-                        jobs.setdefault((method, tol), []).append(sum(a["seconds"] for a in answers))
-                        errors[method, tol] = max(np.abs(np.array(a["alpha_rate"][-1]) - t).max() for a, t in zip(answers, truth, strict=True))
+                    jobs.setdefault(("heyoka batch", str(tol)), []).append(answer["seconds"])
+                    errors["heyoka batch", str(tol)] = np.abs(np.array(answer["alpha_rate"]) - truth).max()
+            for name, job in variants:
+                answers = [rodyn.ask(base | job | {"hinge_factor": f, "repeats": 2}, 60.0) for f in factors]
+                if all(a["status"] == "done" for a in answers):
+                    key = name, str(job.get("fixed_step", job.get("rtol")))
+                    jobs.setdefault(key, []).append(sum(a["seconds"] for a in answers))
+                    errors[key] = max(np.abs(np.array(a["alpha_rate"][-1]) - t).max() for a, t in zip(answers, truth, strict=True))
         for (name, tol), seconds in jobs.items():
             curves.setdefault(name, []).append((errors[name, tol], min(seconds)))
         for target in (1e-4, 1e-6, 1e-8):
             times = {name: time_at([e for e, _ in points], [s for _, s in points], target) for name, points in curves.items()}
             batch = times.pop("heyoka batch", math.nan)
             best = min((t, name) for name, t in times.items() if np.isfinite(t)) if np.isfinite(list(times.values())).any() else (math.nan, "none")
-            self.figures.append(f"heyoka batch cases per second per core, error of alpha_rate {target:.0e} rad/s: {8 / batch:.0f}; "
+            self.figures.append(f"heyoka batch cases per second per core, table1 varied, error of alpha_rate {target:.0e} rad/s: {8 / batch:.0f}; "
                                 f"rodyn {8 / best[0]:.0f} ({best[1]})")
 
     def compare_right_hand_sides(self) -> None:
