@@ -48,7 +48,7 @@ TOLERANCES = [10.0**-k for k in range(4, 13)]
 QUICK_TOLERANCES = [10.0**-k for k in (4, 6, 8, 10, 12)]
 ATOL = 0.01  # times rtol
 ERK_ORDERS = range(2, 9)
-FIXED = [("erk", 4), ("erk", 8), ("dop853", 0)]  # besides any method that only knows fixed steps
+FIXED_ORDERS = {"erk": (4, 8)}  # with fixed steps; other methods: their own order, if they know fixed steps
 FIXED_HALVINGS = 8
 PEERS = ["heyoka", "scipy", "sundae", "exudyn"]
 PROBES = np.array([0.25, 0.5, 0.75, 1.0])
@@ -184,7 +184,7 @@ class Benchmark:
             else:
                 found.append(Line(method, "rodyn", method))
         found += [Line(f"{method} {order} fixed" if order else f"{method} fixed", "rodyn", method, order, True)
-                  for method, order in FIXED if not self.quick or method == "dop853"]
+                  for method in self.names["names"] for order in FIXED_ORDERS.get(method, (0,)) if not (self.quick and order)]
         for peer in PEERS:
             if peer in self.workers:
                 answer = self.workers[peer].ask({"method": "names", "scene": scene_path(scene)}, START_UP)
@@ -381,7 +381,8 @@ class Benchmark:
         curves: dict[str, list[tuple[float, float]]] = {}
         variants = [(m, {"method": m, "rtol": tol, "atol": ATOL * tol}) for m in self.names["names"] if m not in ("adams", "bdf")
                     for tol in self.tolerances]
-        variants += [("dop853 fixed", {"method": "dop853", "fixed_step": 1.0 / steps}) for steps in (500, 700, 1000, 1400, 2000, 2800, 4000)]
+        variants += [(f"{m} fixed", {"method": m, "fixed_step": 1.0 / steps}) for m in self.names["names"] if m not in ("adams", "bdf", "erk")
+                     for steps in (100, 200, 350, 500, 700, 1000, 1400, 2000, 2800, 4000)]
         jobs: dict[tuple[str, str], list[float]] = {}
         errors: dict[tuple[str, str], float] = {}
         for _ in range(3):
