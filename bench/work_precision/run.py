@@ -148,12 +148,13 @@ class Benchmark:
     def __init__(self, arguments: argparse.Namespace) -> None:
         self.quick = arguments.quick
         self.references = arguments.out.parent / "references"
-        self.budget = arguments.budget or (3.0 if self.quick else 6.0)
         self.rounds = arguments.rounds or (5 if self.quick else 7)
         self.minutes = arguments.minutes or (4.0 if self.quick else 25.0)
         self.deadline = math.inf
         self.wanted = arguments.methods
         self.scenes = arguments.scenes or (QUICK_SCENES if self.quick else SCENES)
+        share = 60.0 * self.minutes / len(self.scenes)
+        self.budget = arguments.budget or min(6.0, max(0.5, share / 40))  # lines that are hopeless must leave time for the others
         self.tolerances = QUICK_TOLERANCES if self.quick else TOLERANCES
         python = ROOT / "bench" / "peers" / ".venv" / "bin" / "python"
         self.workers = {"rodyn": Worker("rodyn", [build()])}
@@ -577,7 +578,7 @@ def main() -> int:
     parser.add_argument("--scenes", nargs="+", default=[], choices=SCENES, metavar="SCENE", help=f"of {', '.join(SCENES)}")
     parser.add_argument("--methods", nargs="+", default=[], help="only lines whose names contain one of these")
     parser.add_argument("--no-peers", action="store_true")
-    parser.add_argument("--budget", type=float, default=0.0, help="seconds that one computation may take")
+    parser.add_argument("--budget", type=float, default=0.0, help="seconds that one computation may take; default: 1/40 of a scene's time, at most 6")
     parser.add_argument("--minutes", type=float, default=0.0, help="that the computations may take, besides references and ensembles")
     parser.add_argument("--rounds", type=int, default=0)
     parser.add_argument("--docs", action="store_true", help="put tables and pictures into docs/work_precision.md")
