@@ -342,7 +342,7 @@ class Benchmark:
             if found:
                 error, line, scene = min(found)
                 self.figures.append(f"{line} agrees with the reference to {error:.0e} rad at its tightest ({scene})" +
-                                    ("" if error < AGREEMENT else ": NOT the same equations?"))
+                                    ("" if error < AGREEMENT else ": tighter tolerances were left out, or its equations differ"))
         for scene, key, unit in (("table1", "error_alpha_rate", "rad/s"), ("rigid", "error_phi", "rad")):
             if scene not in self.results:
                 continue
