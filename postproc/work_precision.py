@@ -37,8 +37,8 @@ def scene_names(file: str | pathlib.Path) -> list[str]:
 def draw(scenes: Sequence[BenchmarkScene]) -> Figure:
     columns = max(len(scene.errors) for scene in scenes)
     methods = list(dict.fromkeys(method for scene in scenes for method in scene.method))
-    figure, grid = style.new_figure(len(scenes), columns, width=style.WIDTH if columns > 1 else 0.7 * style.WIDTH,
-                                    height=0.7 + 2.8 * len(scenes) + (0.1 if columns > 1 else 0.15) * len(methods))  # the legend
+    figure, grid = style.new_figure(len(scenes), columns, width=style.WIDTH if columns > 1 or len(methods) > 8 else 0.7 * style.WIDTH,
+                                    height=0.7 + 2.8 * len(scenes) + 0.1 * len(methods))  # the legend
     figure.suptitle("Work against precision")
     for row, scene in zip(grid, scenes, strict=True):
         for i, axes in enumerate(row):
