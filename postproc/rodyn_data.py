@@ -392,6 +392,8 @@ class BenchmarkScene(NamedTuple):
     method: np.ndarray
     rtol: np.ndarray
     seconds: np.ndarray
+    fixed_step: np.ndarray  # 0: adaptive
+    foreign: np.ndarray  # true: computed by another program
     errors: dict[str, tuple[str, np.ndarray]]  # data set: label, values
 
 
@@ -416,7 +418,9 @@ def read_benchmark(path: str | pathlib.Path) -> list[BenchmarkScene]:
                 raise DataError(f"{path}: scene '{name}' has neither {' nor '.join(BENCHMARK_ERRORS)}")
             title = text_of(group.attrs.get("title", "")) or name
             method = np.array(texts(group["method"]))
-            scenes.append(BenchmarkScene(name, title, method, group["rtol"][()], group["seconds"][()], errors))
+            fixed_step = group["fixed_step"][()] if "fixed_step" in group else np.zeros(method.size)
+            foreign = np.array(texts(group["program"])) != "rodyn" if "program" in group else np.zeros(method.size, bool)
+            scenes.append(BenchmarkScene(name, title, method, group["rtol"][()], group["seconds"][()], fixed_step, foreign, errors))
     if not scenes:
         raise DataError(f"{path}: is no benchmark file: no group with a data set 'seconds'")
     return scenes
