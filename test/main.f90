@@ -11,6 +11,7 @@ program tester
    use test_integrators, only: collect_integrators
    use test_kernels, only: collect_kernels
    use test_motion, only: collect_motion
+   use test_newton, only: collect_newton
    use test_namelist, only: collect_namelist
    use test_namelist_faults, only: collect_namelist_faults
    use test_namelist_fuzz, only: collect_namelist_fuzz
@@ -38,6 +39,7 @@ program tester
    call run('quadrature', collect_quadrature)
    call run('kernels', collect_kernels)
    call run('motion', collect_motion)
+   call run('newton', collect_newton)
    call run('integrators', collect_integrators)
    call run('progress', collect_progress)
    call run('namelist', collect_namelist)
