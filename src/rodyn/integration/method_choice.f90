@@ -27,7 +27,7 @@ module rodyn_method_choice
    real(wp), parameter :: stability_limit = 6.0_wp !! step times decay rate that it bears
    real(wp), parameter :: stages = 12.0_wp         !! right-hand sides of its step
    real(wp), parameter :: long_run = 5000.0_wp     !! right-hand sides of an explicit run that are worth a trial
-   real(wp), parameter :: stiff_ratio = 400.0_wp   !! fastest rate over the chain's frequencies from where implicit steps may pay
+   real(wp), parameter :: stiff_ratio = 200.0_wp   !! fastest rate over the chain's frequencies from where implicit steps may pay
    real(wp), parameter :: trial_share = 0.3_wp     !! of an explicit run, spent on one candidate at most
    real(wp), parameter :: lead = 1.1_wp            !! by which an implicit method must be faster: it is less accurate
 

@@ -24,7 +24,7 @@ module rodyn_method_trial
       [candidate_type('dop853', 0), candidate_type('bdf', 0), candidate_type('bdf', 2)] ! the explicit one first
 
    real(wp), parameter :: first_effort = 400.0_wp     !! of a candidate, doubled from round to round
-   real(wp), parameter :: explicit_effort = 3000.0_wp !! are enough to know the even pace of the explicit method
+   real(wp), parameter :: explicit_effort = 3000.0_wp !! are enough to know the rather even pace of the explicit method
    real(wp), parameter :: clear_lead = 4.0_wp         !! of an implicit method, with which the trial ends
 
    !> A run that can be continued.
@@ -73,7 +73,7 @@ contains
       allowed = first_effort
       do
          do i = 1, size(candidates)
-            if (candidates(i)%method == 'dop853' .and. runners(i)%effort > explicit_effort) cycle
+            if (candidates(i)%method == 'dop853' .and. runners(i)%effort > max(explicit_effort, 0.25_wp*allowed)) cycle
             if (hopeless(runners(i), candidates(i), runners(1)%pace)) cycle
             call continue_runner(runners(i), candidates(i), scene%n, y, t_first, allowed)
          end do
