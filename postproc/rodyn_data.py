@@ -426,6 +426,19 @@ def read_benchmark(path: str | pathlib.Path) -> list[BenchmarkScene]:
     return scenes
 
 
+def read_stiffness(path: str | pathlib.Path) -> tuple[list[str], dict[str, np.ndarray]]:
+    """A file of bench/stiffness.f90: names of the methods, and columns with one entry per run (method counts from 1)."""
+    with opened(path) as file:
+        if "methods" not in file.attrs:
+            raise DataError(f"{path}: is no file of bench_stiffness: no attribute 'methods'")
+        columns = {name: data[()] for name, data in file.items() if isinstance(data, h5py.Dataset)}
+        methods = text_of(file.attrs["methods"]).split(",")
+    for needed in ("n", "bending_factor", "damper_factor", "method", "rtol", "seconds", "error_phi", "effort", "auto"):
+        if needed not in columns:
+            raise DataError(f"{path}: no data set '{needed}'")
+    return methods, columns
+
+
 def texts(data: h5py.Dataset) -> list[str]:
     return [text_of(value) for value in np.atleast_1d(data[()]).astype(object)]
 
