@@ -58,7 +58,7 @@ contains
       motion%n_q = scene%n_q
       motion%n_dof = scene%n_dof
       motion%free = scene%n_base > 0
-      motion%turning = motion%free
+      motion%n_ignorable = scene%n_base
       motion%ledger = ledger
       motion%n_controlled = scene%n_q + scene%n_dof
       motion%n_states = motion%n_controlled + merge(2, 0, ledger)

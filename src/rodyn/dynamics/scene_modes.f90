@@ -86,13 +86,13 @@ contains
          if (size(modes%omega_2) /= modes%n) deallocate (modes%omega_2, modes%damping, modes%u, modes%v)
       end if
       if (.not. allocated(modes%omega_2)) allocate (modes%omega_2(modes%n), modes%damping(modes%n), modes%u(modes%n, m), &
-                                                    modes%v(m, modes%n))
+                                                    modes%v(m - scene%n_base, modes%n))
       j = 0
       do i = 1, rank
          if (.not. self%omega_2(i) > max(slowest**2, 1.0e-12_wp*maxval(self%omega_2))) cycle
          j = j + 1
          modes%omega_2(j) = self%omega_2(i)
-         modes%v(:, j) = self%rotated(:, i)
+         modes%v(:, j) = self%rotated(scene%n_base + 1:, i)
          self%shapes(:, i) = self%shapes(:, i)/self%omega_2(i)
          modes%u(j, :) = self%shapes(:, i)
          modes%damping(j) = 0.0_wp

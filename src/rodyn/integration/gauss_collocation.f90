@@ -21,8 +21,8 @@ module rodyn_gauss_collocation
       real(wp) :: a2(s, s) = 0.0_wp         !! A^2: twice integrated
       real(wp) :: coefficients(s, s) = 0.0_wp !! (k+1, j): node values to coefficients of P_k
       complex(wp) :: lambda(n_pairs) = 0.0_wp !! eigenvalues of A in the upper half plane
-      real(wp) :: real_part(s, s, n_pairs) = 0.0_wp, imaginary_part(s, s, n_pairs) = 0.0_wp
-         !! of the spectral projectors: A = sum 2 Re(lambda_j W_j)
+      real(wp) :: projectors(s, s, 2*n_pairs) = 0.0_wp !! twice the real parts of the spectral projectors W_j of A, then
+                                                    !! minus twice the imaginary parts: f(A) = sum 2 Re(f(lambda_j) W_j)
    contains
       procedure :: interpolation
       procedure :: function_of_a
@@ -84,8 +84,8 @@ contains
          left = conjg(cmplx(vl(:, j), vl(:, j + 1), wp))
          left = left/sum(left*right)
          do i = 1, s
-            rule%real_part(:, i, pair) = real(right*left(i), wp)
-            rule%imaginary_part(:, i, pair) = aimag(right*left(i))
+            rule%projectors(:, i, pair) = 2.0_wp*real(right*left(i), wp)
+            rule%projectors(:, i, n_pairs + pair) = -2.0_wp*aimag(right*left(i))
          end do
       end do
    end subroutine decompose
@@ -95,11 +95,20 @@ contains
       class(gauss_collocation), intent(in) :: self
       real(wp), intent(in) :: start, length
       real(wp) :: matrix(s, s)
-      real(wp) :: p(0:s)
-      integer :: i
-      do i = 1, s
-         call shifted_legendre(start + length*self%c(i), p)
-         matrix(i, :) = matmul(p(0:s - 1), self%coefficients)
+      real(wp) :: p(s, 0:s - 1), x(s)
+      integer :: j, k
+
+      x = 2.0_wp*(start + length*self%c) - 1.0_wp
+      p(:, 0) = 1.0_wp
+      p(:, 1) = x
+      do k = 2, s - 1
+         p(:, k) = ((2*k - 1)*x*p(:, k - 1) - (k - 1)*p(:, k - 2))*(1.0_wp/k)
+      end do
+      do j = 1, s
+         matrix(:, j) = self%coefficients(1, j)
+         do k = 1, s - 1
+            matrix(:, j) = matrix(:, j) + self%coefficients(k + 1, j)*p(:, k)
+         end do
       end do
    end function interpolation
 
@@ -108,11 +117,19 @@ contains
       class(gauss_collocation), intent(in) :: self
       complex(wp), intent(in) :: values(n_pairs)
       real(wp) :: matrix(s, s)
-      integer :: j
-      matrix = 0.0_wp
-      do j = 1, n_pairs
-         matrix = matrix + (2.0_wp*real(values(j), wp))*self%real_part(:, :, j) - &
-                  (2.0_wp*aimag(values(j)))*self%imaginary_part(:, :, j)
+      real(wp) :: weight(2*n_pairs), column(s)
+      integer :: i, j, l
+
+      weight = [real(values, wp), aimag(values)]
+      do i = 1, s
+         column = 0.0_wp
+         do j = 1, 2*n_pairs
+            !$omp simd
+            do l = 1, s
+               column(l) = column(l) + weight(j)*self%projectors(l, i, j)
+            end do
+         end do
+         matrix(:, i) = column
       end do
    end function function_of_a
 

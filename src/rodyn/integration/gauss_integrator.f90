@@ -21,7 +21,7 @@ module rodyn_gauss_integrator
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, time_text
    use rodyn_trigonometry, only: sine_cosine
    use rodyn_lane_algebra, only: apply, apply_one, apply_both, project, expand, combine, square_sums, straight_lines, &
-      subtract, correct
+      subtract, add
    use rodyn_gauss_collocation, only: gauss_collocation, new_gauss_collocation
    implicit none (type, external)
    private
@@ -33,7 +33,7 @@ module rodyn_gauss_integrator
    real(wp), parameter :: wanted_estimate = 0.3_wp, largest_estimate = 4.0_wp !! of the error, in tolerances
    real(wp), parameter :: first_phase = 2.0_wp      !! fastest frequency times the first step
    real(wp), parameter :: smallest_phase = 0.2_wp  !! slower vibrations need no implicit treatment
-   real(wp), parameter :: search_cost = 40.0_wp     !! finding modes, in iterations
+   real(wp), parameter :: search_cost = 1.5_wp      !! finding modes, in iterations per unknown
 
    !> The matrices of one step length.
    type :: step_matrices
@@ -233,7 +233,7 @@ contains
       do
          call self%permit_step(error)
          if (allocated(error)) return
-         if (self%excess > search_cost) call search_modes(self, self%h, error)
+         if (self%excess > search_cost*self%mechanics%n_dof) call search_modes(self, self%h, error)
          if (allocated(error)) return
          call choose_end(self, h, t_new)
          if (h <= 4.0_wp*spacing(self%t)) then
@@ -378,7 +378,7 @@ contains
       class(gauss_integrator), intent(inout) :: self
       logical, intent(out) :: ok
       real(wp) :: rest, motion, stiff(s)
-      integer :: i, m
+      integer :: i, m, base
 
       m = self%mechanics%n_dof
       ok = .true.
@@ -392,10 +392,11 @@ contains
          self%now%ahead = self%rule%interpolation(1.0_wp, self%now%h/self%last%h)
       end if
       call apply(m, self%now%ahead, self%last%smooth, self%trial%f)
-      call project(m, self%modes%n, self%modes%v, self%trial%f, self%modal)
+      base = self%mechanics%n_ignorable
+      call project(m - base, self%modes%n, self%modes%v, self%trial%f(:, base + 1:), self%modal)
       do i = 1, self%modes%n
-         rest = dot_product(self%modes%v(:, i), self%y(:m))
-         motion = dot_product(self%modes%v(:, i), self%y(m + 1:2*m))
+         rest = dot_product(self%modes%v(:, i), self%y(base + 1:m))
+         motion = dot_product(self%modes%v(:, i), self%y(m + base + 1:2*m))
          stiff = self%modes%omega_2(i)*(rest + (self%now%h*motion)*self%rule%c) + self%modes%damping(i)*motion
          self%reply(:, i) = -stiff
          call apply_one(self%now%g(:, :, i), self%modal(:, i) - stiff, self%reply(:, i))
@@ -436,9 +437,9 @@ contains
       real(wp), contiguous, intent(in) :: q(:, :), p(:, :)
       integer :: i
 
-      associate (n => self%modes%n, m => size(q, 2))
-         call project(m, n, self%modes%v, q, self%modal)
-         call project(m, n, self%modes%v, p, self%reply)
+      associate (n => self%modes%n, m => size(q, 2), base => self%mechanics%n_ignorable)
+         call project(m - base, n, self%modes%v, q(:, base + 1:), self%modal)
+         call project(m - base, n, self%modes%v, p(:, base + 1:), self%reply)
          do i = 1, n
             self%modal(:, i) = self%modes%omega_2(i)*self%modal(:, i) + self%modes%damping(i)*self%reply(:, i)
          end do
@@ -452,9 +453,10 @@ contains
       real(wp), intent(in) :: t
       logical, intent(out) :: ok
       real(wp) :: change, before, times(s), sums(s)
-      integer :: j, m
+      integer :: j, m, base
 
       m = self%mechanics%n_dof
+      base = self%mechanics%n_ignorable
       before = 0.0_wp
       times = t + self%now%h*self%rule%c
       call nodes_from(self, y)
@@ -465,10 +467,11 @@ contains
          self%refused = .not. ok
          if (.not. ok) return
          call subtract(m, self%trial%a, self%trial%f, self%guess)
-         call project(m, self%modes%n, self%modes%v, self%guess, self%modal)
+         call project(m - base, self%modes%n, self%modes%v, self%guess(:, base + 1:), self%modal)
          call combine(self%modes%n, self%now%g, self%modal, self%reply)
-         call correct(m, self%modes%n, self%modes%u, self%reply, self%now%h_a, self%now%h2_a2, self%weight, self%guess, &
-                      self%trial%f, self%trial%p, self%trial%q, sums)
+         call expand(m, self%modes%n, self%modes%u, self%reply, self%guess)
+         call add(m, self%guess, self%weight, self%trial%f, sums)
+         call move_nodes(self, self%guess)
          change = self%now%h*sqrt(sum(sums)/real(s*m, wp))
          if (.not. ieee_is_finite(change)) exit
          if (j > 1) then
@@ -503,8 +506,19 @@ contains
       m = self%mechanics%n_dof
       call straight_lines(m, y, y(m + 1:), self%now%h, self%rule%c, self%trial%q)
       call straight_lines(m, y(m + 1:), y(m + 1:), 0.0_wp, self%rule%c, self%trial%p)
-      call apply_both(m, self%now%h_a, self%now%h2_a2, self%trial%f, self%trial%p, self%trial%q)
+      call move_nodes(self, self%trial%f)
    end subroutine nodes_from
+
+   !> P = P + h A dF, Q = Q + h^2 A^2 dF; ignorable coordinates are not followed.
+   subroutine move_nodes(self, df)
+      class(gauss_integrator), intent(inout) :: self
+      real(wp), contiguous, intent(in) :: df(:, :)
+      associate (m => self%mechanics%n_dof, base => self%mechanics%n_ignorable)
+         call apply(base, self%now%h_a, df, self%trial%p)
+         call apply_both(m - base, self%now%h_a, self%now%h2_a2, df(:, base + 1:), self%trial%p(:, base + 1:), &
+                         self%trial%q(:, base + 1:))
+      end associate
+   end subroutine move_nodes
 
    !> Root mean square of weighted values over nodes and unknowns.
    pure real(wp) function weighted_norm(x, weight)
@@ -536,7 +550,7 @@ contains
             self%increment(j) = h*(y(m + j) + h*(0.5_wp*self%guess(1, j) - self%guess(2, j)/6.0_wp))
          end do
       end associate
-      if (self%mechanics%turning) call turn_displacement(self, y)
+      if (self%mechanics%n_ignorable == 3) call turn_displacement(self, y)
       if (size(y) > 2*m) call add_quadratures(self, t, self%increment(2*m + 1:))
       if (.not. present(estimate)) return
       high = sums(8) + sums(7)

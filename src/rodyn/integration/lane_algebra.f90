@@ -1,12 +1,13 @@
 !> Small linear algebra on values at all lanes, x(lanes, n): each operation on a lane vector is one vector instruction.
 !>
-!> The lanes stand in explicit shapes, so that the compiler knows their number.
+!> The lanes stand in explicit shapes, so that the compiler knows their number. Sums of three columns at a time stay in
+!> registers, and none waits for the other; chains of flexible rods have columns in threes.
 module rodyn_lane_algebra
    use rodyn_kinds, only: wp
    use rodyn_lanes, only: s => lanes
    implicit none (type, external)
    private
-   public :: apply, apply_one, apply_both, project, expand, combine, square_sums, straight_lines, subtract, correct
+   public :: apply, apply_one, apply_both, project, expand, combine, square_sums, straight_lines, subtract, add
 
 contains
 
@@ -58,33 +59,40 @@ contains
       integer, intent(in) :: n
       real(wp), intent(in) :: a(s, s), b(s, s), x(s, n)
       real(wp), intent(inout) :: y(s, n), z(s, n)
-      real(wp), dimension(s) :: y_1, y_2, z_1, z_2
+      real(wp), dimension(s) :: y_1, y_2, y_3, z_1, z_2, z_3
       integer :: i, j, l
-      do j = 1, n - 1, 2 ! two columns at a time stay in registers
+      do j = 1, n - 2, 3
          y_1 = y(:, j)
          y_2 = y(:, j + 1)
+         y_3 = y(:, j + 2)
          z_1 = z(:, j)
          z_2 = z(:, j + 1)
+         z_3 = z(:, j + 2)
          do i = 1, s
             !$omp simd
             do l = 1, s
                y_1(l) = y_1(l) + a(l, i)*x(i, j)
                y_2(l) = y_2(l) + a(l, i)*x(i, j + 1)
+               y_3(l) = y_3(l) + a(l, i)*x(i, j + 2)
                z_1(l) = z_1(l) + b(l, i)*x(i, j)
                z_2(l) = z_2(l) + b(l, i)*x(i, j + 1)
+               z_3(l) = z_3(l) + b(l, i)*x(i, j + 2)
             end do
          end do
          y(:, j) = y_1
          y(:, j + 1) = y_2
+         y(:, j + 2) = y_3
          z(:, j) = z_1
          z(:, j + 1) = z_2
+         z(:, j + 2) = z_3
       end do
-      if (modulo(n, 2) == 0) return
-      call apply_one(a, x(:, n), y(:, n))
-      call apply_one(b, x(:, n), z(:, n))
+      do j = n - modulo(n, 3) + 1, n
+         call apply_one(a, x(:, j), y(:, j))
+         call apply_one(b, x(:, j), z(:, j))
+      end do
    end subroutine apply_both
 
-   !> z(:, i) = sum_j v(j, i) x(:, j). Four sums at a time stay in registers.
+   !> z(:, i) = sum_j v(j, i) x(:, j).
    pure subroutine project(n, m, v, x, z)
       integer, intent(in) :: n, m
       real(wp), intent(in) :: v(n, m), x(s, n)
@@ -129,38 +137,34 @@ contains
       integer, intent(in) :: n, m
       real(wp), intent(in) :: u(m, n), z(s, m)
       real(wp), intent(inout) :: x(s, n)
-      real(wp), dimension(s) :: sum_1, sum_2, sum_3, sum_4
-      integer :: i, j, l, single
+      real(wp), dimension(s) :: sum_1, sum_2, sum_3
+      integer :: i, j, l
 
-      single = mod(n, 4)
-      do j = 1, single
-         sum_1 = x(:, j)
-         do i = 1, m
-            !$omp simd
-            do l = 1, s
-               sum_1(l) = sum_1(l) + u(i, j)*z(l, i)
-            end do
-         end do
-         x(:, j) = sum_1
-      end do
-      do j = single + 1, n, 4
+      do j = 1, n - 2, 3
          sum_1 = x(:, j)
          sum_2 = x(:, j + 1)
          sum_3 = x(:, j + 2)
-         sum_4 = x(:, j + 3)
          do i = 1, m
             !$omp simd
             do l = 1, s
                sum_1(l) = sum_1(l) + u(i, j)*z(l, i)
                sum_2(l) = sum_2(l) + u(i, j + 1)*z(l, i)
                sum_3(l) = sum_3(l) + u(i, j + 2)*z(l, i)
-               sum_4(l) = sum_4(l) + u(i, j + 3)*z(l, i)
             end do
          end do
          x(:, j) = sum_1
          x(:, j + 1) = sum_2
          x(:, j + 2) = sum_3
-         x(:, j + 3) = sum_4
+      end do
+      do j = n - modulo(n, 3) + 1, n
+         sum_1 = x(:, j)
+         do i = 1, m
+            !$omp simd
+            do l = 1, s
+               sum_1(l) = sum_1(l) + u(i, j)*z(l, i)
+            end do
+         end do
+         x(:, j) = sum_1
       end do
    end subroutine expand
 
@@ -189,45 +193,6 @@ contains
       call apply_one(matrices(:, :, m), z(:, m), y(:, m))
    end subroutine combine
 
-   !> One correction: dF = R + U z is added to F, h A dF to P, h^2 A^2 dF to Q; (weight_j dF(:, j))^2 is summed lane by lane.
-   pure subroutine correct(n, m, u, z, h_a, h2_a2, weight, r, f, p, q, sums)
-      integer, intent(in) :: n, m
-      real(wp), intent(in) :: u(m, n), z(s, m), h_a(s, s), h2_a2(s, s), weight(n)
-      real(wp), intent(inout) :: r(s, n) !! R, then dF
-      real(wp), intent(inout) :: f(s, n), p(s, n), q(s, n)
-      real(wp), intent(out) :: sums(s)
-      real(wp), dimension(s) :: d_1, d_2
-      integer :: i, j, l
-
-      sums = 0.0_wp
-      do j = 1, n - 1, 2
-         d_1 = r(:, j)
-         d_2 = r(:, j + 1)
-         do i = 1, m
-            !$omp simd
-            do l = 1, s
-               d_1(l) = d_1(l) + u(i, j)*z(l, i)
-               d_2(l) = d_2(l) + u(i, j + 1)*z(l, i)
-            end do
-         end do
-         !$omp simd
-         do l = 1, s
-            r(l, j) = d_1(l)
-            r(l, j + 1) = d_2(l)
-            f(l, j) = f(l, j) + d_1(l)
-            f(l, j + 1) = f(l, j + 1) + d_2(l)
-            sums(l) = sums(l) + (weight(j)*d_1(l))**2 + (weight(j + 1)*d_2(l))**2
-         end do
-         call apply_both(2, h_a, h2_a2, r(:, j:j + 1), p(:, j:j + 1), q(:, j:j + 1))
-      end do
-      if (modulo(n, 2) == 0) return
-      call expand(1, m, u(:, n:n), z, r(:, n:n))
-      f(:, n) = f(:, n) + r(:, n)
-      sums = sums + (weight(n)*r(:, n))**2
-      call apply_one(h_a, r(:, n), p(:, n))
-      call apply_one(h2_a2, r(:, n), q(:, n))
-   end subroutine correct
-
    !> Lane by lane, sum of (weight_j x(:, j))^2.
    pure function square_sums(n, x, weight) result(sums)
       integer, intent(in) :: n
@@ -253,6 +218,23 @@ contains
          x(:, j) = q(j) + (h*p(j))*c
       end do
    end subroutine straight_lines
+
+   !> y = y + x; also returns the sum of (weight_j x(:, j))^2, lane by lane.
+   pure subroutine add(n, x, weight, y, sums)
+      integer, intent(in) :: n
+      real(wp), intent(in) :: x(s, n), weight(n)
+      real(wp), intent(inout) :: y(s, n)
+      real(wp), intent(out) :: sums(s)
+      integer :: j, l
+      sums = 0.0_wp
+      do j = 1, n
+         !$omp simd
+         do l = 1, s
+            y(l, j) = y(l, j) + x(l, j)
+            sums(l) = sums(l) + (weight(j)*x(l, j))**2
+         end do
+      end do
+   end subroutine add
 
    !> z = x - y.
    pure subroutine subtract(n, x, y, z)

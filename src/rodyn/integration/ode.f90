@@ -31,14 +31,14 @@ module rodyn_ode
       real(wp), allocatable :: omega_2(:)    !! square of the natural frequency (n) [rad^2/s^2]
       real(wp), allocatable :: damping(:)    !! (n) [1/s]
       real(wp), allocatable :: u(:, :)       !! shapes, transposed (n, n_dof)
-      real(wp), allocatable :: v(:, :)       !! their duals (n_dof, n)
+      real(wp), allocatable :: v(:, :)       !! their duals, without ignorable coordinates (n_dof - n_ignorable, n)
    end type stiff_modes
 
-   !> A mechanical system: y = (q, p [, quadratures]) with p' from q, p and t, and q' = p, except that q(1:2) are
-   !> measured along axes that turn at the rate p(3), if `turning`.
+   !> A mechanical system: y = (q, p [, quadratures]) with p' from q, p and t, and q' = p. If there are ignorable
+   !> coordinates, the first two are a displacement along axes that turn:  q(1)' = p(1) + p(3) q(2),  q(2)' = p(2) - p(3) q(1).
    type, abstract, extends(ode_system) :: mechanical_system
       integer :: n_dof = 0        !! length of p
-      logical :: turning = .false. !! q(1)' = p(1) + p(3) q(2),  q(2)' = p(2) - p(3) q(1); p' does not depend on q(1:3)
+      integer :: n_ignorable = 0  !! leading coordinates that p' does not depend on: 0, or 3 (displacement and rotation)
    contains
       procedure(can_interface), deferred :: has_lanes
       procedure(lanes_interface), deferred :: lane_accelerations
