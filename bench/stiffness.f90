@@ -27,7 +27,7 @@ program bench_stiffness
    real(wp), parameter :: patience = 1.0_wp, patience_reference = 60.0_wp !! [s]
    integer, parameter :: n_chunks = 100
    !> Candidates: a method, and its highest order if not the usual one.
-   character(len=8), parameter :: methods(*) = [character(len=8) :: 'dop853', 'bdf', 'bdf 2']
+   character(len=8), parameter :: methods(*) = [character(len=8) :: 'dop853', 'gauss', 'bdf', 'bdf 2']
 
    !> One run.
    type :: run_record

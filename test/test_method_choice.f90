@@ -100,7 +100,7 @@ contains
          if (candidates(i)%method == choice%method .and. candidates(i)%order == choice%options%order) chosen = effort(i)
       end do
       if (chosen > 0.0_wp .and. chosen <= 1.5_wp*minval(effort)) return
-      write (text, '("EI times ", es8.1, ", D times ", es8.1, ", rtol = ", es8.1, ": ", a, " of ", 3es9.2)') bending, dampers, &
+      write (text, '("EI times ", es8.1, ", D times ", es8.1, ", rtol = ", es8.1, ": ", a, " of ", *(es9.2))') bending, dampers, &
          tolerance, choice%method, effort
       call raise(error, trim(text)//'; '//choice%reason)
    end subroutine compare

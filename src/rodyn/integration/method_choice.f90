@@ -2,7 +2,8 @@
 !>
 !> The measure is the time to the end of the run at the user's tolerances, by which all methods bring the chord angles to some
 !> ten times rtol or better (docs/performance.md, "Large and stiff"). Vibrations that the tolerances resolve must be followed
-!> by any method, and the cheapest steps win: explicit, order 8. Strong dampers, or rods so stiff that their vibrations drown
+!> by any method, and the cheapest steps win: collocation of order 16 for short chains of rods that bend, else explicit steps of
+!> order 8. Strong dampers, or rods so stiff that their vibrations drown
 !> in the tolerances, call for BDF. How much of a fast vibration is excited depends on loads and initial values, so where the
 !> fastest rates are far above those of the chain of rods, the methods are tried on the beginning of the run.
 module rodyn_method_choice
@@ -11,7 +12,7 @@ module rodyn_method_choice
    use rodyn_scene, only: scene_type
    use rodyn_fastest_rates, only: fastest_rates, with_rigid_rods
    use rodyn_integrator, only: solver_options, time_text
-   use rodyn_method_trial, only: candidates, try_methods
+   use rodyn_method_trial, only: candidates, effort_of_nodes, try_methods
    implicit none (type, external)
    private
    public :: method_choice, choose_method
@@ -26,9 +27,11 @@ module rodyn_method_choice
    real(wp), parameter :: vibration_limit = 3.0_wp !! step times frequency that order 8 takes
    real(wp), parameter :: stability_limit = 6.0_wp !! step times decay rate that it bears
    real(wp), parameter :: stages = 12.0_wp         !! right-hand sides of its step
+   real(wp), parameter :: iterations = 4.0_wp      !! of a collocation step
+   real(wp), parameter :: first_search = 60.0_wp   !! right-hand sides per rod that its first modes cost
    real(wp), parameter :: long_run = 5000.0_wp     !! right-hand sides of an explicit run that are worth a trial
    real(wp), parameter :: stiff_ratio = 200.0_wp   !! fastest rate over the chain's frequencies from where implicit steps may pay
-   real(wp), parameter :: trial_share = 0.3_wp     !! of an explicit run, spent on one candidate at most
+   real(wp), parameter :: trial_share = 0.5_wp     !! of a run that follows all vibrations, spent on one candidate at most
    real(wp), parameter :: lead = 1.1_wp            !! by which an implicit method must be faster: it is less accurate
 
 contains
@@ -56,17 +59,25 @@ contains
       explicit = stages*t_end*max(frequency/vibration_limit, decay/stability_limit)
       call fastest_rates(with_rigid_rods(scene), y(:scene%n_base + scene%n + scene%n_q - scene%n_dof), slow, unused)
       if (explicit < long_run .or. max(frequency, decay) < stiff_ratio*slow) then
-         choice%reason = choice%reason//': explicit, order 8, about '//whole(explicit/stages)//' steps'
+         if (collocation_is_cheaper(scene, options, frequency, decay, t_end)) then
+            choice%method = 'gauss'
+            choice%reason = choice%reason//': collocation, order 16, about '// &
+                            whole(t_end*frequency/collocation_phase(options%rtol))//' steps'
+         else
+            choice%reason = choice%reason//': explicit, order 8, about '//whole(explicit/stages)//' steps'
+         end if
          return
       end if
       call try_methods(scene, y, options, minval([t_end, pack(scene%loads%switches, scene%loads%switches > 0.0_wp)]), t_end, &
                        trial_share, forecast, choice%effort)
-      forecast(1) = forecast(1)/lead
+      forecast(:2) = forecast(:2)/lead ! dop853, gauss
       best = minloc(forecast, dim=1)
       choice%method = trim(candidates(best)%method)
       choice%options%order = candidates(best)%order
       if (best == 1) then
          choice%reason = choice%reason//': explicit, order 8, about '//whole(explicit/stages)//' steps'
+      else if (choice%method == 'gauss') then
+         choice%reason = choice%reason//': collocation, order 16, in a trial the fastest'
       else
          choice%reason = choice%reason//': stiff, implicit, '
          if (candidates(best)%order > 0) choice%reason = choice%reason//'order '//whole(real(candidates(best)%order, wp))//', '
@@ -74,6 +85,28 @@ contains
             ' times as fast as explicit'
       end if
    end subroutine choose_method
+
+   !> Collocation against order 8, by what a unit of phase of the fastest vibration costs at the user's tolerance. The phases of
+   !> their steps are those of table 1 (docs/performance.md); they change little from scene to scene.
+   logical function collocation_is_cheaper(scene, options, frequency, decay, t_end)
+      type(scene_type), intent(in) :: scene
+      type(solver_options), intent(in) :: options
+      real(wp), intent(in) :: frequency, decay, t_end
+      real(wp) :: explicit_phase, radians
+
+      collocation_is_cheaper = .false.
+      if (.not. scene%dynamic_bending .or. scene%assembled .or. decay > frequency) return
+      radians = frequency*t_end
+      explicit_phase = vibration_limit*min(1.0_wp, (1.0e4_wp*options%rtol)**0.125_wp)
+      collocation_is_cheaper = first_search*scene%n + iterations*effort_of_nodes(scene%n)*radians/ &
+                               collocation_phase(options%rtol) < (stages + 1.0_wp)*radians/explicit_phase
+   end function collocation_is_cheaper
+
+   !> Phase of the fastest vibration in a collocation step.
+   pure real(wp) function collocation_phase(rtol)
+      real(wp), intent(in) :: rtol
+      collocation_phase = 9.0_wp*min(1.0_wp, (1.0e4_wp*rtol)**0.0625_wp)
+   end function collocation_phase
 
    !> Three digits.
    function short(value) result(text)

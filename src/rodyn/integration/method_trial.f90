@@ -5,13 +5,14 @@
 module rodyn_method_trial
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
+   use rodyn_lanes, only: lanes
    use rodyn_scene, only: scene_type
    use rodyn_motion, only: motion_type, new_motion
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics
    use rodyn_integrators, only: new_integrator
    implicit none (type, external)
    private
-   public :: candidate_type, candidates, effort_of, try_methods
+   public :: candidate_type, candidates, effort_of, effort_of_nodes, try_methods
 
    !> A method, with the highest order if it is not the usual one.
    type :: candidate_type
@@ -19,12 +20,13 @@ module rodyn_method_trial
       integer :: order = 0
    end type candidate_type
 
-   !> Explicit; implicit; implicit and stable for every vibration, which BDF is up to order 2.
-   type(candidate_type), parameter :: candidates(3) = &
-      [candidate_type('dop853', 0), candidate_type('bdf', 0), candidate_type('bdf', 2)] ! the explicit one first
+   !> Explicit; collocation; implicit; implicit and stable for every vibration, which BDF is up to order 2.
+   type(candidate_type), parameter :: candidates(4) = [candidate_type('dop853', 0), candidate_type('gauss', 0), &
+      candidate_type('bdf', 0), candidate_type('bdf', 2)]
+   integer, parameter :: n_even = 2 !! the first of them follow all vibrations, at a rather even pace; the very first is explicit
 
    real(wp), parameter :: first_effort = 400.0_wp     !! of a candidate, doubled from round to round
-   real(wp), parameter :: explicit_effort = 3000.0_wp !! are enough to know the rather even pace of the explicit method
+   real(wp), parameter :: even_effort = 3000.0_wp     !! are enough to know the rather even pace of methods that follow all vibrations
    real(wp), parameter :: clear_lead = 4.0_wp         !! of an implicit method, with which the trial ends
 
    !> A run that can be continued.
@@ -47,9 +49,16 @@ contains
       integer, intent(in) :: n !! rods
       type(solver_statistics), intent(in) :: stats
       effort_of = real(stats%n_rhs, wp)
+      if (method == 'gauss') effort_of = real(stats%n_rhs, wp)/real(lanes, wp)*effort_of_nodes(n) + 30.0_wp*n*real(stats%n_jac, wp)
       if (method == 'bdf') effort_of = 2.2_wp*real(stats%n_rhs, wp) + 3.0_wp*real(stats%n_jac, wp) + &
                                        real(stats%n_steps, wp)*(2.2_wp + 20.0_wp/(1.0_wp + 0.37_wp*n))
    end function effort_of
+
+   !> Effort of one iteration of a collocation step with n rods that bend: eight right-hand sides in lanes, and the stiff modes.
+   pure real(wp) function effort_of_nodes(n)
+      integer, intent(in) :: n
+      effort_of_nodes = 4.5_wp + 0.55_wp*n
+   end function effort_of_nodes
 
    !> Effort that each candidate would need from 0 to `t_end`, huge if it fails. An implicit method may creep at first,
    !> until vibrations it does not follow have died out. So its pace is that of the last round; that of order 2, which no
@@ -60,11 +69,11 @@ contains
       type(solver_options), intent(in) :: options
       real(wp), intent(in) :: t_first               !! end of the trial at the latest; no load switches before [s]
       real(wp), intent(in) :: t_end                 !! [s]
-      real(wp), intent(in) :: share                 !! of the effort of the explicit method, for one candidate at most
+      real(wp), intent(in) :: share                 !! of the effort of the best even method, for one candidate at most
       real(wp), intent(out) :: forecast(size(candidates))
       real(wp), intent(out) :: effort               !! spent on the trial
       type(runner) :: runners(size(candidates))
-      real(wp) :: allowed, others(size(candidates))
+      real(wp) :: allowed, budget, others(size(candidates))
       integer :: i
 
       do i = 1, size(candidates)
@@ -73,19 +82,20 @@ contains
       allowed = first_effort
       do
          do i = 1, size(candidates)
-            if (candidates(i)%method == 'dop853' .and. runners(i)%effort > max(explicit_effort, 0.25_wp*allowed)) cycle
+            if (i <= n_even .and. runners(i)%effort > max(even_effort, 0.25_wp*allowed)) cycle
             if (hopeless(runners(i), candidates(i), runners(1)%pace)) cycle
             call continue_runner(runners(i), candidates(i), scene%n, y, t_first, allowed)
          end do
          forecast = [(forecast_of(runners(i), t_end, candidates(i)%order == 2 .and. allowed > 3.0_wp*first_effort), &
                       i=1, size(candidates))]
          if (any(runners%reached >= t_first) .or. runners(1)%failed) exit
-         if (1.4_wp*allowed >= share*forecast(1)) exit ! a short round would tell nothing
+         budget = share*minval(forecast(:n_even))
+         if (1.4_wp*allowed >= budget) exit ! a short round would tell nothing
          i = minloc(forecast, dim=1)
          others = forecast
          others(i) = huge(1.0_wp)
-         if (i > 1 .and. allowed > 3.0_wp*first_effort .and. clear_lead*forecast(i) < minval(others)) exit
-         allowed = min(2.0_wp*allowed, share*forecast(1))
+         if (i > n_even .and. allowed > 3.0_wp*first_effort .and. clear_lead*forecast(i) < minval(others)) exit
+         allowed = min(2.0_wp*allowed, budget)
       end do
       effort = sum(runners%effort)
       do i = 1, size(runners)
@@ -99,7 +109,7 @@ contains
       type(runner), intent(in) :: self
       type(candidate_type), intent(in) :: candidate
       real(wp), intent(in) :: explicit_pace
-      hopeless = candidate%method == 'bdf' .and. candidate%order == 0 .and. self%effort > 2.0_wp*explicit_effort .and. &
+      hopeless = candidate%method == 'bdf' .and. candidate%order == 0 .and. self%effort > 2.0_wp*even_effort .and. &
                  2.0_wp*self%pace < explicit_pace .and. self%growth(1) < 1.1_wp
    end function hopeless
 
