@@ -11,6 +11,8 @@ program tester
    use test_hdf5_files, only: collect_hdf5_files
    use test_integrators, only: collect_integrators
    use test_kernels, only: collect_kernels
+   use test_lanes, only: collect_lanes
+   use test_lanes, only: collect_lanes
    use test_motion, only: collect_motion
    use test_namelist, only: collect_namelist
    use test_namelist_faults, only: collect_namelist_faults
@@ -38,6 +40,7 @@ program tester
 
    call run('quadrature', collect_quadrature)
    call run('kernels', collect_kernels)
+   call run('lanes', collect_lanes)
    call run('motion', collect_motion)
    call run('integrators', collect_integrators)
    call run('gauss', collect_gauss)
