@@ -8,6 +8,7 @@ program tester
    use test_gauss, only: collect_gauss
    use test_beams, only: collect_beams
    use test_invariants, only: collect_invariants
+   use test_ensemble, only: collect_ensemble
    use test_hdf5_files, only: collect_hdf5_files
    use test_integrators, only: collect_integrators
    use test_kernels, only: collect_kernels
@@ -44,6 +45,7 @@ program tester
    call run('motion', collect_motion)
    call run('integrators', collect_integrators)
    call run('gauss', collect_gauss)
+   call run('ensemble', collect_ensemble)
    call run('progress', collect_progress)
    call run('namelist', collect_namelist)
    call run('namelist_faults', collect_namelist_faults)
