@@ -392,6 +392,8 @@ class BenchmarkScene(NamedTuple):
     method: np.ndarray
     rtol: np.ndarray
     seconds: np.ndarray
+    fixed_step: np.ndarray  # 0: adaptive
+    foreign: np.ndarray  # true: computed by another program
     errors: dict[str, tuple[str, np.ndarray]]  # data set: label, values
 
 
@@ -416,10 +418,25 @@ def read_benchmark(path: str | pathlib.Path) -> list[BenchmarkScene]:
                 raise DataError(f"{path}: scene '{name}' has neither {' nor '.join(BENCHMARK_ERRORS)}")
             title = text_of(group.attrs.get("title", "")) or name
             method = np.array(texts(group["method"]))
-            scenes.append(BenchmarkScene(name, title, method, group["rtol"][()], group["seconds"][()], errors))
+            fixed_step = group["fixed_step"][()] if "fixed_step" in group else np.zeros(method.size)
+            foreign = np.array(texts(group["program"])) != "rodyn" if "program" in group else np.zeros(method.size, bool)
+            scenes.append(BenchmarkScene(name, title, method, group["rtol"][()], group["seconds"][()], fixed_step, foreign, errors))
     if not scenes:
         raise DataError(f"{path}: is no benchmark file: no group with a data set 'seconds'")
     return scenes
+
+
+def read_stiffness(path: str | pathlib.Path) -> tuple[list[str], dict[str, np.ndarray]]:
+    """A file of bench/stiffness.f90: names of the methods, and columns with one entry per run (method counts from 1)."""
+    with opened(path) as file:
+        if "methods" not in file.attrs:
+            raise DataError(f"{path}: is no file of bench_stiffness: no attribute 'methods'")
+        columns = {name: data[()] for name, data in file.items() if isinstance(data, h5py.Dataset)}
+        methods = text_of(file.attrs["methods"]).split(",")
+    for needed in ("n", "bending_factor", "damper_factor", "method", "rtol", "seconds", "error_phi", "effort", "auto"):
+        if needed not in columns:
+            raise DataError(f"{path}: no data set '{needed}'")
+    return methods, columns
 
 
 def texts(data: h5py.Dataset) -> list[str]:

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Work-precision diagrams from a benchmark file: time of computation against error, one line per method.
+"""Work-precision diagrams from a benchmark file: time of computation against error, one line per method; other programs' marks are open.
 
     postproc/work_precision.py benchmark.h5
 """
@@ -29,12 +29,17 @@ def plot(file: str | pathlib.Path, out: str | pathlib.Path, scenes: Sequence[str
     return figure
 
 
+def scene_names(file: str | pathlib.Path) -> list[str]:
+    """Names of the scenes in a benchmark file."""
+    return [scene.name for scene in read_benchmark(file)]
+
+
 def draw(scenes: Sequence[BenchmarkScene]) -> Figure:
     columns = max(len(scene.errors) for scene in scenes)
-    figure, grid = style.new_figure(len(scenes), columns, width=style.WIDTH if columns > 1 else 0.7 * style.WIDTH,
-                                    height=0.7 + 2.8 * len(scenes))
-    figure.suptitle("Work against precision")
     methods = list(dict.fromkeys(method for scene in scenes for method in scene.method))
+    figure, grid = style.new_figure(len(scenes), columns, width=style.WIDTH if columns > 1 or len(methods) > 8 else 0.7 * style.WIDTH,
+                                    height=0.7 + 2.8 * len(scenes) + 0.1 * len(methods))  # the legend
+    figure.suptitle("Work against precision")
     for row, scene in zip(grid, scenes, strict=True):
         for i, axes in enumerate(row):
             if i >= len(scene.errors):
@@ -52,11 +57,12 @@ def draw_panel(axes: Axes, scene: BenchmarkScene, label: str, error: np.ndarray,
     axes.set_title(style.shorten(scene.title, 46), loc="left")
     for i, method in enumerate(methods):
         rows = np.flatnonzero((scene.method == method) & ~failed)
-        rows = rows[np.argsort(scene.rtol[rows])]
+        rows = rows[np.lexsort((scene.fixed_step[rows], scene.rtol[rows]))]
         if rows.size:
-            axes.plot(error[rows], scene.seconds[rows], label=method, **style.mark_style(i))
+            fill = {"markerfacecolor": "white"} if scene.foreign[rows[0]] else {}
+            axes.plot(error[rows], scene.seconds[rows], label=method, **style.mark_style(i) | fill)
     lost = failed & np.isfinite(scene.seconds)
-    if failed.any():
+    if lost.any():
         axes.plot(np.full(lost.sum(), 0.98), scene.seconds[lost], transform=axes.get_yaxis_transform(), linestyle="none", marker="x",
                   markersize=7, markeredgewidth=1.8, color=style.FAILED, label="failed, or without error")
     axes.invert_xaxis()

@@ -13,8 +13,9 @@ program tester
    use test_integrators, only: collect_integrators
    use test_kernels, only: collect_kernels
    use test_lanes, only: collect_lanes
-   use test_lanes, only: collect_lanes
+   use test_method_choice, only: collect_method_choice
    use test_motion, only: collect_motion
+   use test_newton, only: collect_newton
    use test_namelist, only: collect_namelist
    use test_namelist_faults, only: collect_namelist_faults
    use test_namelist_fuzz, only: collect_namelist_fuzz
@@ -43,9 +44,11 @@ program tester
    call run('kernels', collect_kernels)
    call run('lanes', collect_lanes)
    call run('motion', collect_motion)
+   call run('newton', collect_newton)
    call run('integrators', collect_integrators)
    call run('gauss', collect_gauss)
    call run('ensemble', collect_ensemble)
+   call run('method_choice', collect_method_choice)
    call run('progress', collect_progress)
    call run('namelist', collect_namelist)
    call run('namelist_faults', collect_namelist_faults)

@@ -8,7 +8,8 @@ module test_sweep
    use rodyn_sweep_config, only: sweep_config
    use rodyn_sweep_plan, only: new_plan, sweep_plan
    use rodyn_sweep_reader, only: parse_sweep
-   use rodyn_sweep_record, only: append_record, check_shard, decode_record, header_words, record_words, seal_words
+   use rodyn_sweep_record, only: decode_record, encode_record, is_sound, record_words
+   use rodyn_sweep_shard, only: header_words, shard_extent, shard_header, shard_trailer, sift_shard
    use test_testing, only: check, check_close, new_test, unittest
    implicit none (type, external)
    private
@@ -23,6 +24,8 @@ module test_sweep
       "&axis key = 'mass_ratio', values = 2, 4, 2 /"//nl// &
       "&axis key = 'model.inertia', text_values = 'distributed', 'lumped' /"
 
+   integer(i8), parameter :: fingerprint = 77_i8
+
 contains
 
    subroutine collect_sweep(suite)
@@ -34,7 +37,9 @@ contains
          new_test('the mass ratio is that of all nodes to all rods', ratio_of_masses), &
          new_test('bending follows the inertia', bending_follows), &
          new_test('results come back as they went in', round_trip), &
-         new_test('every flipped bit and every truncation of a shard is noticed', all_damage_noticed)]
+         new_test('a checksum goes on where another ended', continued_checksum), &
+         new_test('every flipped bit and every truncation of a shard is noticed', all_damage_noticed), &
+         new_test('good records of a damaged shard are kept, and no other', good_records_kept)]
    end subroutine collect_sweep
 
    subroutine new_sweep(text, sweep, plan, error)
@@ -54,6 +59,14 @@ contains
       if (allocated(error)) return
       call check(error, hexadecimal(crc64([transfer(text, 0_i8)])), hexadecimal(crc64_text(text)), 'words')
    end subroutine published_checksum
+
+   subroutine continued_checksum(error)
+      type(error_type), allocatable, intent(out) :: error
+      integer(i8), parameter :: words(3) = [3_i8, 1_i8, 4_i8]
+      call check(error, hexadecimal(crc64(words(2:), crc64(words(:1)))), hexadecimal(crc64(words)), 'words')
+      if (allocated(error)) return
+      call check(error, hexadecimal(crc64_text('6789', crc64_text('12345'))), '995DC9BBDF1939FA', 'text')
+   end subroutine continued_checksum
 
    subroutine grid_order(error)
       type(error_type), allocatable, intent(out) :: error
@@ -135,9 +148,10 @@ contains
       integer :: used
 
       call sample(kept, shape)
-      used = 0
-      call append_record(kept, shape, words, used)
+      call encode_record(kept, shape, words, used)
       call check(error, used, record_words(shape, status_done, 9), 'length')
+      if (allocated(error)) return
+      call check(error, is_sound(words(:used)), 'checksum')
       if (allocated(error)) return
       allocate (back%final(12), back%probes(12, 2), back%times(0), back%series(12, 0))
       call decode_record(words(:used), shape, back)
@@ -148,33 +162,99 @@ contains
       call check_close(error, [back%final, back%probes(:, 2)], [kept%final, kept%probes(:, 2)], 0.0_wp, 'states')
    end subroutine round_trip
 
-   subroutine all_damage_noticed(error)
-      type(error_type), allocatable, intent(out) :: error
-      integer(i8), parameter :: fingerprint = 77_i8
+   !> A shard of three records, of cases 1, 2 and 3.
+   subroutine new_shard(shape, words, n)
+      type(case_shape), intent(out) :: shape
+      integer(i8), intent(out) :: words(:)
+      integer, intent(out) :: n !! words in use, with the trailer
       type(case_result) :: kept
-      type(case_shape) :: shape
-      integer(i8) :: words(100)
-      integer :: bit, i, used
+      type(shard_extent) :: extent
+      integer :: i
 
       call sample(kept, shape)
-      used = header_words
-      call append_record(kept, shape, words, used)
-      call seal_words(words, used, 1, fingerprint)
-      call check(error, check_shard(words(:used), fingerprint, shape, 3), '', 'sound')
+      words(:header_words) = shard_header(fingerprint)
+      call extent%add(shard_header(fingerprint))
+      do i = 1, 3
+         kept%case = i
+         call encode_record(kept, shape, words(extent%used + 1:), n)
+         call extent%add(words(extent%used + 1:extent%used + n))
+      end do
+      n = extent%used + 3
+      words(extent%used + 1:n) = shard_trailer(extent)
+   end subroutine new_shard
+
+   !> Is this a whole, sealed shard of cases 1 to `n_cases`?
+   logical function is_whole(words, shape, n_cases)
+      integer(i8), intent(in) :: words(:)
+      type(case_shape), intent(in) :: shape
+      integer, intent(in) :: n_cases
+      integer(i8) :: copy(size(words))
+      type(shard_extent) :: extent
+      character(len=:), allocatable :: fault
+
+      copy = words
+      call sift_shard(copy, fingerprint, shape, n_cases, extent, fault)
+      is_whole = len(fault) == 0 .and. extent%sealed
+   end function is_whole
+
+   subroutine all_damage_noticed(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_shape) :: shape
+      integer(i8) :: words(200)
+      integer :: bit, i, n
+
+      call new_shard(shape, words, n)
+      call check(error, is_whole(words(:n), shape, 3), 'a sound shard was refused')
       if (allocated(error)) return
-      call check(error, check_shard(words(:used), fingerprint, shape, 2), 'records do not fit the sweep', 'case 3 of 2')
-      do i = 1, used
+      call check(error, .not. is_whole(words(:n), shape, 2), 'case 3 of 2 passed')
+      do i = 1, n
          do bit = 0, 63
             if (allocated(error)) return
             words(i) = ieor(words(i), ishft(1_i8, bit))
-            call check(error, len(check_shard(words(:used), fingerprint, shape, 3)) > 0, 'a flipped bit passed')
+            call check(error, .not. is_whole(words(:n), shape, 3), 'a flipped bit passed')
             words(i) = ieor(words(i), ishft(1_i8, bit))
          end do
       end do
-      do i = 0, used - 1
+      do i = 0, n - 1
          if (allocated(error)) return
-         call check(error, len(check_shard(words(:i), fingerprint, shape, 3)) > 0, 'a truncated shard passed')
+         call check(error, .not. is_whole(words(:i), shape, 3), 'a truncated shard passed')
       end do
+      if (allocated(error)) return
+      words(n + 1) = 0
+      call check(error, .not. is_whole(words(:n + 1), shape, 3), 'an extended shard passed')
    end subroutine all_damage_noticed
+
+   !> Whatever bit is flipped, wherever the file is cut: what remains are whole records that were written.
+   subroutine good_records_kept(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_shape) :: shape
+      integer(i8) :: words(200), copy(200)
+      type(shard_extent) :: extent
+      character(len=:), allocatable :: fault
+      integer :: bit, i, length, n, wanted
+
+      call new_shard(shape, words, n)
+      length = int(words(header_words + 1))
+      do i = header_words + 1, header_words + length ! of the first record: only that is lost
+         do bit = 0, 63, 7
+            copy = words
+            copy(i) = ieor(copy(i), ishft(1_i8, bit))
+            call sift_shard(copy(:n), fingerprint, shape, 3, extent, fault)
+            call check(error, extent%n_records == 2 .and. len(fault) > 0, 'two of three')
+            if (allocated(error)) return
+            call check(error, all(copy(header_words + 1:extent%used) == words(header_words + length + 1:n - 3)), 'the two')
+            if (allocated(error)) return
+         end do
+      end do
+      do i = 0, n - 3
+         copy = words
+         call sift_shard(copy(:i), fingerprint, shape, 3, extent, fault)
+         wanted = max(0, i - header_words)/length
+         call check(error, extent%n_records == wanted .and. .not. extent%sealed, 'records before the cut')
+         if (allocated(error)) return
+         call check(error, (len(fault) == 0) .eqv. (i >= header_words .and. modulo(i - header_words, length) == 0), 'torn')
+         if (allocated(error)) return
+      end do
+   end subroutine good_records_kept
 
 end module test_sweep

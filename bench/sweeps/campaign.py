@@ -103,7 +103,15 @@ class Campaign:
         wanted = self.reference()
         random.seed(1)
         directory = self.scratch.path("kills")
-        equal, killed, resumed_at = [], 0, []
+        equal, killed, resumed_at, again = [], 0, [], 0
+        there: set[tuple[int, bytes]] = set()  # results that killed processes left behind
+
+        def ended() -> None:
+            nonlocal again
+            again += integrated_again(directory, there)
+            equal.append(content(directory) == wanted)
+            there.clear()
+
         while killed < times:
             process = subprocess.Popen(command("fast500.nml", directory, "--quiet"), stderr=subprocess.DEVNULL)
             time.sleep(random.uniform(0.0, 0.8))
@@ -111,20 +119,24 @@ class Campaign:
                 process.kill()
                 killed += 1
                 process.wait()
-                resumed_at.append(len(list((directory / "shards").glob("*.shard"))) if directory.exists() else 0)
+                there.update(results(directory))
+                resumed_at.append(len(there))
                 continue
-            equal.append(content(directory) == wanted)
+            ended()
             self.scratch.remove(directory)
         self.run("fast500.nml", directory)
-        equal.append(content(directory) == wanted)
-        self.tell(all(equal), f"kill -9 at {killed} random times in {len(equal)} sweeps of 500 cases (in {sum(n > 0 for n in resumed_at)} "
-                  f"of them with results on the disk), each resumed to its end: {sum(equal)} byte-equal, no case missing or doubled")
+        ended()
+        self.tell(all(equal) and again == 0,
+                  f"kill -9 at {killed} random times in {len(equal)} sweeps of 500 cases (in {sum(n > 0 for n in resumed_at)} "
+                  f"of them with results on the disk, {sum(resumed_at) // killed} on average), each resumed to its end: {sum(equal)} byte-equal, "
+                  f"no case missing or doubled; {again} finished cases were integrated again")
 
     def rank_kills(self, times: int = 10) -> None:
         wanted = self.reference()
         random.seed(3)
         directory = self.scratch.path("rank-kills")
-        slowest, codes, killed, equal = 0.0, set(), 0, []
+        slowest, codes, killed, equal, again = 0.0, set(), 0, [], 0
+        there: set[tuple[int, bytes]] = set()
         while killed < times:
             process = subprocess.Popen(command("fast500.nml", directory, "--quiet", ranks=2), env=ENVIRONMENT,
                                        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -140,39 +152,87 @@ class Campaign:
             code = process.wait()
             slowest = max(slowest, time.monotonic() - start)
             codes.add(code)
+            there.update(results(directory))
             if (directory / "sweep.h5").exists():
+                again += integrated_again(directory, there)
+                there.clear()
                 equal.append(content(directory) == wanted)
                 self.scratch.remove(directory)
         self.run("fast500.nml", directory, ranks=2)
+        again += integrated_again(directory, there)
         equal.append(content(directory) == wanted)
-        self.tell(slowest < 60 and all(equal), f"one of two ranks killed, {killed} times: each job ended within {slowest:.1f} s "
-                  f"(exit codes {sorted(codes)}), {len(equal)} sweeps resumed to their ends: {sum(equal)} byte-equal")
+        self.tell(slowest < 60 and all(equal) and again == 0, f"one of two ranks killed, {killed} times: each job ended within {slowest:.1f} s "
+                  f"(exit codes {sorted(codes)}), {len(equal)} sweeps resumed to their ends: {sum(equal)} byte-equal; "
+                  f"{again} finished cases were integrated again")
 
     def damage(self, kind: str, times: int) -> None:
+        """Damage to sealed shards. What is lost is at most what was damaged, and nothing else is integrated again."""
         wanted = self.reference()
         random.seed(2)
         directory = self.scratch.path(kind)
         self.run("fast500.nml", directory)
-        noticed = redone = 0
+        noticed = redone = integrated = 0
         for _ in range(times):
+            before = set(results(directory))
             shard = random.choice(sorted((directory / "shards").glob("*.shard")))
-            data = bytearray(shard.read_bytes())
-            if kind == "truncation":
-                data = data[: random.randrange(len(data))]
-            else:
-                place = random.randrange(8 * len(data))
-                data[place // 8] ^= 1 << place % 8
-            shard.write_bytes(data)
+            hurt(shard, kind)
             result = self.run("fast500.nml", directory)
             noticed += f"shard {shard.name}: " in result.stderr and "set aside" in result.stderr
-            redone += content(directory) == wanted
-        self.tell(noticed == redone == times, f"{kind}, {times} times: {noticed} noticed, {redone} redone to byte-equal data")
+            after = results(directory)
+            redone += content(directory) == wanted and len(after) == 500
+            integrated += len(set(after) - before)
+        self.tell(noticed == redone == times and (kind == "truncation" or integrated <= times),
+                  f"{kind}, {times} times: {noticed} noticed, {redone} mended to byte-equal data; {integrated} cases integrated again in "
+                  f"all")
 
     def truncation(self) -> None:
         self.damage("truncation", 20)
 
     def bits(self) -> None:
         self.damage("flipped-bit", 100)
+
+    def open_shards(self, times: int = 20) -> None:
+        """Damage to the open shard of a killed process."""
+        wanted = self.reference()
+        random.seed(4)
+        noticed = redone = lost = 0
+        for i in range(times):
+            directory = self.scratch.path("open")
+            process = subprocess.Popen(command("fast500.nml", directory, "--quiet"), stderr=subprocess.DEVNULL)
+            while process.poll() is None and len(results(directory)) < 100:
+                time.sleep(0.002)
+            process.kill()
+            process.wait()
+            before = set(results(directory))
+            (shard,) = directory.glob("shards/*.open")
+            hurt(shard, ("truncation", "flipped-bit")[i % 2])
+            result = self.run("fast500.nml", directory)
+            noticed += f"shard {shard.name}: " in result.stderr and "set aside" in result.stderr
+            after = results(directory)
+            redone += content(directory) == wanted and len(after) == 500
+            lost += len(before - set(after)) if i % 2 else 0
+        self.tell(noticed == redone == times and lost <= times // 2,
+                  f"open shard of a killed process cut or with a flipped bit, {times} times: {noticed} noticed, {redone} resumed to "
+                  f"byte-equal data, no case missing or doubled; {lost} results lost by {times // 2} flipped bits")
+
+    def result(self, times: int = 20) -> None:
+        """Damage to sweep.h5."""
+        wanted = self.reference()
+        random.seed(5)
+        directory = self.scratch.path("result")
+        self.run("fast500.nml", directory)
+        before = set(results(directory))
+        noticed = merged = 0
+        for i in range(times):
+            data = (directory / "sweep.h5").read_bytes()
+            hurt(directory / "sweep.h5", ("truncation", "flipped-bit")[i % 2])
+            damaged = (directory / "sweep.h5").read_bytes()
+            result = self.run("fast500.nml", directory)
+            noticed += "merged again" in result.stderr and damaged != data
+            merged += content(directory) == wanted and (directory / f"sweep-{i + 1}.h5").read_bytes() == damaged
+        self.tell(noticed == merged == times and set(results(directory)) == before,
+                  f"sweep.h5 cut or with a flipped bit, {times} times: {noticed} noticed, {merged} merged again to byte-equal data, the "
+                  f"damaged ones kept")
 
     def disk(self) -> None:
         """A small file system where one can be mounted (as root), and a limit on the size of files."""
@@ -205,7 +265,7 @@ class Campaign:
         while process.poll() is None:
             time.sleep(0.1)
             found = re.search(r"VmRSS:\s+(\d+)", pathlib.Path(f"/proc/{process.pid}/status").read_text())
-            if found and list((directory / "shards").glob("*.shard")):
+            if found and list((directory / "shards").glob("*.shard*")):
                 sizes.append((int(found[1]), (directory / "sweep.h5.partial").exists()))
         working = [size for size, merging in sizes if not merging]
         first, last = working[len(working) // 20], working[-2]
@@ -237,6 +297,23 @@ def command(sweep: str, directory: pathlib.Path, *options: str, ranks: int = 1) 
     return [*launcher, RODYN, "sweep", str(HERE / sweep), "--output", str(directory), *options]
 
 
+def integrated_again(directory: pathlib.Path, there: set[tuple[int, bytes]]) -> int:
+    """Of a sweep of 500 cases that has ended: results that were there before but are not any more, and second ones."""
+    found = results(directory)
+    return len(there - set(found)) + len(found) - 500
+
+
+def hurt(path: pathlib.Path, kind: str) -> None:
+    """Cut a file somewhere, or flip one bit of it."""
+    data = bytearray(path.read_bytes())
+    if kind == "truncation":
+        data = data[: random.randrange(0, len(data), 2) | 1]  # odd, as between two records there would be nothing to notice
+    else:
+        place = random.randrange(8 * len(data))
+        data[place // 8] ^= 1 << place % 8
+    path.write_bytes(data)
+
+
 def last_line(text: str) -> str:
     return text.strip().splitlines()[-1]
 
@@ -257,7 +334,30 @@ def content(directory: pathlib.Path) -> dict:
     return found
 
 
-TRIALS = ("same", "signals", "kills", "rank_kills", "truncation", "bits", "disk", "memory", "overhead", "speedup")
+def records(shard: pathlib.Path) -> list[tuple[int, bytes]]:
+    """The whole records of a shard, sealed or open: case, and all bytes (wall times among them, so no two runs have the same)."""
+    data = shard.read_bytes()
+    found = []
+    at = 3 * 8
+    while at + 8 <= len(data):
+        end = at + 8 * int.from_bytes(data[at : at + 8], "little")
+        if end == at or end > len(data):  # trailer, or torn
+            break
+        found.append((int.from_bytes(data[at + 8 : at + 16], "little"), data[at:end]))
+        at = end
+    return found
+
+
+def results(directory: pathlib.Path) -> list[tuple[int, bytes]]:
+    """All results that are in a directory. One that is being sealed by a living process may be left out."""
+    found = []
+    for shard in sorted(directory.glob("shards/*.shard")) + sorted(directory.glob("shards/*.open")):
+        with contextlib.suppress(FileNotFoundError):
+            found += records(shard)
+    return found
+
+
+TRIALS = ("same", "signals", "kills", "rank_kills", "truncation", "bits", "open_shards", "result", "disk", "memory", "overhead", "speedup")
 
 
 def main() -> int:

@@ -344,7 +344,7 @@ def test_a_run_says_what_it_uses_and_what_it_skips(results, scene, uses, skips):
 
 @pytest.mark.parametrize("scene, sizes, method", [
     ("flexible", "3 rods (3 distinct kinds), 24 states; recursive kernel, O(n)", r"dop853: auto: frequencies .* rad/s, dampers"),
-    ("one rod", "1 rod (1 distinct kind), 12 states; recursive kernel, O(n)", r"dop853: auto: frequencies .* at least \d+ steps"),
+    ("one rod", "1 rod (1 distinct kind), 12 states; recursive kernel, O(n)", r"dop853: auto: frequencies .* about \d+ steps"),
     ("one rigid rod, fixed", "1 rod (1 distinct kind), 2 states; recursive kernel, O(n)", r"dop853: auto: "),
     ("paper, bdf, assembled", "3 rods (3 distinct kinds), 24 states; assembled kernel, O(n^3)", "bdf: chosen by the case"),
     ("adams", "3 rods (3 distinct kinds), 24 states; recursive kernel, O(n)", "adams: chosen by the case"),
@@ -358,7 +358,7 @@ def test_a_run_says_how_large_it_is_and_which_method_it_takes(results, scene, si
 def test_strong_dampers_call_for_an_implicit_method(tmp_path):
     case = write_case(tmp_path, TIMES + SPACECRAFT + CHAIN.replace(" /\n", ", hinge_damping = 5e4 /\n") + MOMENT)
     lines = printed(rodyn("run", case, cwd=tmp_path).stdout)
-    assert re.match(r"bdf: auto: .*: stiff dampers, implicit", lines["method"])
+    assert re.match(r"bdf: auto: .*: stiff, implicit", lines["method"])
 
 
 def test_the_formulation_of_the_article_is_noted_where_it_matters(results, tmp_path):

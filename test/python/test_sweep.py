@@ -6,6 +6,7 @@ RODYN=path  the program under test; otherwise bin/rodyn.
 import math
 import os
 import pathlib
+import resource
 import shutil
 import signal
 import subprocess
@@ -19,7 +20,7 @@ import xarray
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 RODYN = os.environ.get("RODYN", str(ROOT / "bin" / "rodyn"))
 sys.path.insert(0, str(ROOT / "bench" / "sweeps"))
-from campaign import content  # noqa: E402
+from campaign import content, results  # noqa: E402
 
 BASE = """
 &case t_end = 0.05, n_outputs = 5 /
@@ -245,17 +246,26 @@ def test_two_ranks_give_the_same_bytes(here):
     assert failed.returncode == 2 and failed.stderr.count("none.nml: cannot be read") == 1
 
 
-LONG = "&sweep base = 'base.nml' /\n&axis key = 'case.t_end', start = 4, stop = 5, count = 100 /"
+LONG = "&sweep base = 'base.nml' /\n&axis key = 'case.t_end', start = 4, stop = 5, count = 60 /"
 
 
-def start(here: pathlib.Path, *options: str) -> subprocess.Popen[str]:
-    (here / "s.nml").write_text(LONG)
+def start(here: pathlib.Path, *options: str, text: str = LONG, results_there: int = 1) -> subprocess.Popen[str]:
+    """A sweep that has come so far."""
+    (here / "s.nml").write_text(text)
     process = subprocess.Popen([RODYN, "sweep", "s.nml", "--quiet", *options], cwd=here, stderr=subprocess.PIPE, text=True)
-    for _ in range(1000):
-        if list(here.glob("s/shards/*.shard")) or process.poll() is not None:
+    end = time.monotonic() + 20
+    while time.monotonic() < end:
+        if len(results(here / "s")) >= results_there:
             return process
-        time.sleep(0.01)
-    raise AssertionError("no shard after 10 s")
+        assert process.poll() is None, "the sweep ended too early"
+        time.sleep(0.001)
+    raise AssertionError("too few results after 20 s")
+
+
+def kill(process: subprocess.Popen[str]) -> None:
+    process.kill()
+    process.communicate()
+    assert process.returncode == -signal.SIGKILL
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGUSR1])
@@ -276,27 +286,167 @@ def test_two_processes_never_work_on_one_sweep(here):
     process = start(here)
     for options in ((), ("--shard", "1/2"), ("--force",)):
         assert "works on this sweep" in sweep(here, None, *options, code=2).stderr
-    process.kill()
-    process.communicate()
-    shards = set(here.glob("s/shards/*.shard"))
+    kill(process)
     sweep(here, None)
-    assert shards and (here / "s" / "sweep.h5").exists()
+    assert (here / "s" / "sweep.h5").exists()
+
+
+SHORT = "&sweep base = 'base.nml' /\n&axis key = 'mass_ratio', start = 2, stop = 32, count = 1000 /"
+
+
+def test_no_finished_case_is_integrated_again_after_a_kill(here):
+    """A result once appended is the only one its case ever has: its bytes hold wall times, which another run would change."""
+    there: list = []
+    for _ in range(8):
+        kill(start(here, text=SHORT, results_there=len(there) + 10))
+        before, there = there, results(here / "s")
+        assert set(before) <= set(there)
+    assert f"{len(there)} of them on the disk" in sweep(here, None).stdout
+    end = results(here / "s")
+    assert sorted(case for case, _ in end) == list(range(1, 1001))
+    assert set(there) <= set(end)
+    wall = opened(here).wall_seconds.values
+    for case, record in there:
+        assert wall[case - 1] == np.frombuffer(record, "<f8")[7]
+    sweep(here, SHORT, name="whole")
+    assert content(here / "s") == content(here / "whole")
+
+
+def test_a_result_is_in_its_file_as_soon_as_its_case_is_finished(here):
+    """Cases of some 20 ms: results that waited for one another would come in few steps."""
+    process = start(here)
+    seen = set()
+    while process.poll() is None:
+        seen.add(len(results(here / "s")))
+        time.sleep(0.001)
+    assert process.returncode == 0 and len(seen) > 30
+
+
+def test_nothing_is_deleted_by_resuming(here):
+    for n in (20, 40, 60):
+        kill(start(here, text=SHORT, results_there=n))
+    numbers = {path.name[: len("r000000-000001")] for path in here.glob("s/shards/*")}
+    sweep(here, None)
+    sealed = {path.name for path in here.glob("s/shards/*.shard")}
+    assert {f"{name}.shard" for name in numbers} < sealed and len(sealed) == len(numbers) + 1 == 4
+
+
+def test_a_write_that_fails_leaves_whole_results(here):
+    """As on a full disk: what the last write managed is cut off again, so that nothing is torn."""
+    (here / "s.nml").write_text(SHORT)
+    limit = 100001
+    process = subprocess.run([RODYN, "sweep", "s.nml", "--quiet"], cwd=here, capture_output=True, text=True,
+                             preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))
+    assert process.returncode == 1 and "File too large; run again" in process.stderr
+    (shard,) = here.glob("s/shards/*.open")
+    there = results(here / "s")
+    assert shard.stat().st_size == 24 + sum(len(record) for _, record in there) > 99000
+    result = sweep(here, None)
+    assert result.stderr == "" and f"{len(there)} of them on the disk" in result.stdout
+    assert set(there) < set(results(here / "s"))
+
+
+@pytest.mark.parametrize("damage", ["cut", "odd", "bit", "empty"])
+def test_good_results_of_a_damaged_open_shard_are_kept(here, damage):
+    kill(start(here, text=SHORT, results_there=30))
+    there = results(here / "s")
+    (shard,) = here.glob("s/shards/*.open")
+    data = bytearray(shard.read_bytes())
+    length = len(there[0][1])
+    at = 24 + 10 * length
+    if damage == "cut":
+        data, good = data[: at + 80], there[:10]
+    elif damage == "odd":
+        data, good = data[: at + 81], there[:10]
+    elif damage == "bit":
+        data[at + 83] ^= 16
+        good = there[:10] + there[11:]
+    else:
+        data, good = data[:0], []
+    shard.write_bytes(data)
+    result = sweep(here, None)
+    assert f"{len(good)} of them on the disk" in result.stdout or not good
+    end = results(here / "s")
+    assert sorted(case for case, _ in end) == list(range(1, 1001))
+    assert set(end) & set(there) == set(good)
+    kept = [path.read_bytes() for path in here.glob("s/shards/*.damaged")]
+    if damage == "empty":  # as by a kill before the first word: nothing to tell
+        assert result.stderr == "" and not kept
+    else:
+        assert f"{shard.name}: checksum wrong; set aside, {len(good)} good results" in result.stderr or damage == "odd"
+        assert "set aside" in result.stderr and kept == [bytes(data)]
+    sweep(here, SHORT, name="whole")
+    assert content(here / "s") == content(here / "whole")
+    assert sweep(here, None).stderr == ""
+
+
+def test_shards_of_living_neighbours_are_left_alone(here):
+    process = start(here, "--shard", "1/2")
+    process.send_signal(signal.SIGSTOP)
+    (shard,) = here.glob("s/shards/*.open")
+    before = shard.read_bytes()
+    sweep(here, None, "--shard", "2/2")
+    assert shard.read_bytes() == before and not list(here.glob("s/shards/*.damaged"))
+    process.send_signal(signal.SIGCONT)
+    assert process.communicate()[1] == "" and process.returncode == 0
+    sweep(here, LONG, name="whole")
+    assert content(here / "s") == content(here / "whole")
 
 
 def test_damage_is_noticed_and_redone(here):
     sweep(here, GRID)
     wanted = content(here / "s")
+    there = results(here / "s")
     shard = next(here.glob("s/shards/*.shard"))
     data = bytearray(shard.read_bytes())
     data[len(data) // 2] ^= 4
     shard.write_bytes(data)
     result = sweep(here, None)
-    assert "checksum wrong; set aside" in result.stderr and content(here / "s") == wanted
+    assert "checksum wrong; set aside, 5 good results" in result.stderr and content(here / "s") == wanted
     assert list(here.glob("s/shards/*.damaged")) and (here / "s" / "sweep-1.h5").exists()
+    assert len(results(here / "s")) == 6 and len(set(results(here / "s")) - set(there)) == 1
     next(here.glob("s/shards/*.shard")).unlink()
     result = sweep(here, None)
     assert "sealed, but not there" in result.stderr and content(here / "s") == wanted
     assert sweep(here, None).stderr == ""
+
+
+@pytest.mark.parametrize("damage", ["bit", "cut", "gone", "unknown"])
+def test_a_damaged_result_is_merged_again(here, damage):
+    sweep(here, GRID)
+    wanted = content(here / "s")
+    there = results(here / "s")
+    file = here / "s" / "sweep.h5"
+    data = bytearray(file.read_bytes())
+    if damage == "bit":
+        data[-5] ^= 1
+    if damage == "cut":
+        data = data[:-1]
+    file.write_bytes(data)
+    if damage == "gone":
+        file.unlink()
+    if damage == "unknown":  # nothing says what it should be
+        (here / "s" / "journal" / "r000000.txt").unlink()
+    result = sweep(here, None)
+    assert content(here / "s") == wanted and results(here / "s") == there
+    if damage == "gone":
+        assert result.stderr == "" and not (here / "s" / "sweep-1.h5").exists()
+    else:
+        assert "set aside as s/sweep-1.h5, merged again" in result.stderr
+        assert (here / "s" / "sweep-1.h5").read_bytes() == data
+    again = sweep(here, None)
+    assert "nothing to compute" in again.stdout and again.stderr == ""
+
+
+def test_a_result_older_than_the_shards_is_merged_again(here):
+    """As after a kill between a retried case and the merge."""
+    limit = "&sweep base = 'base.nml', case_seconds = {} /\n&axis key = 'case.t_end', values = 0.05, 400 /"
+    sweep(here, limit.format(0.3), code=1)
+    old = (here / "s" / "sweep.h5").read_bytes()
+    sweep(here, limit.format(100), "--retry-failed")
+    (here / "s" / "sweep.h5").write_bytes(old)
+    result = sweep(here, None)
+    assert "merged again" in result.stderr and list(opened(here).status) == ["done", "done"]
 
 
 def test_dry_run_writes_nothing(here):

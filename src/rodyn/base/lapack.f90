@@ -6,7 +6,7 @@ module rodyn_lapack
    implicit none (type, external)
    private
    public :: use_one_thread
-   public :: dpotrf, dpotrs, dgesv, dsygvd, dsyev, dgeev, dgemv, dgemm
+   public :: dpotrf, dpotrs, dgesv, dgetrf, dgetrs, dsygvd, dsyev, dgeev, dgemv, dgemm
 
    interface
       !> Cholesky factors of a symmetric positive definite matrix.
@@ -40,6 +40,28 @@ module rodyn_lapack
          real(wp), intent(inout) :: b(ldb, *)
          integer, intent(out) :: info
       end subroutine dgesv
+
+      !> LU factors of a general matrix, rows exchanged.
+      pure subroutine dgetrf(m, n, a, lda, ipiv, info)
+         import :: wp
+         implicit none (type, external)
+         integer, intent(in) :: m, n, lda
+         real(wp), intent(inout) :: a(lda, *)
+         integer, intent(out) :: ipiv(*)
+         integer, intent(out) :: info
+      end subroutine dgetrf
+
+      !> Solve with the factors of dgetrf.
+      pure subroutine dgetrs(trans, n, nrhs, a, lda, ipiv, b, ldb, info)
+         import :: wp
+         implicit none (type, external)
+         character(len=1), intent(in) :: trans
+         integer, intent(in) :: n, nrhs, lda, ldb
+         real(wp), intent(in) :: a(lda, *)
+         integer, intent(in) :: ipiv(*)
+         real(wp), intent(inout) :: b(ldb, *)
+         integer, intent(out) :: info
+      end subroutine dgetrs
 
       !> Eigenvalues (ascending) and vectors of A x = lambda B x, A symmetric, B positive definite.
       pure subroutine dsygvd(itype, jobz, uplo, n, a, lda, b, ldb, w, work, lwork, iwork, liwork, info)

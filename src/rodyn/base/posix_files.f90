@@ -4,14 +4,17 @@
 module rodyn_posix_files
    use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_funloc, c_funptr, c_int, c_int16_t, &
       c_int64_t, c_loc, c_long, c_null_char, c_ptr, c_size_t
+   use rodyn_checksum, only: crc64_text
    use rodyn_errors, only: error_type, raise
    use rodyn_kinds, only: i8
    use rodyn_posix, only: last_failure, last_failure_is, parent_directory, path_exists, rename_over, sync_path, &
       posix_close, posix_closedir, posix_fsync, posix_open, posix_opendir, posix_signal
+   use rodyn_text, only: to_text
    implicit none (type, external)
    private
    public :: make_directory, list_directory
-   public :: write_words, read_words, write_text_file, append_text, file_bytes
+   public :: write_words, read_words, write_text_file, append_text, file_bytes, file_checksum, rename_aside
+   public :: create_file, write_all, o_append, o_wronly ! for `rodyn_growing_file`
    public :: lock_file, open_lock, take_lock, lock_holder, release_lock
    public :: watch_signals, stop_signal
 
@@ -198,7 +201,7 @@ contains
       integer(c_int) :: descriptor
 
       temporary = path//'.tmp'
-      descriptor = posix_creat(temporary//c_null_char, file_mode)
+      descriptor = create_file(temporary)
       if (descriptor < 0) then
          failure = last_failure()
          return
@@ -208,8 +211,31 @@ contains
       if (len(failure) == 0) failure = sync_path(parent_directory(path))
    end function write_durably
 
+   !> An empty file, open for writing; negative on failure.
+   function create_file(path) result(descriptor)
+      character(len=*), intent(in) :: path
+      integer(c_int) :: descriptor
+      descriptor = posix_creat(path//c_null_char, file_mode)
+   end function create_file
+
    !> All bytes, then onto the disk.
    function write_and_close(descriptor, data, bytes) result(failure)
+      integer(c_int), intent(in) :: descriptor
+      type(c_ptr), intent(in) :: data
+      integer(c_size_t), intent(in) :: bytes
+      character(len=:), allocatable :: failure
+      integer(c_int) :: status
+
+      failure = write_all(descriptor, data, bytes)
+      if (len(failure) == 0) then
+         if (posix_fsync(descriptor) /= 0) failure = last_failure()
+      end if
+      status = posix_close(descriptor)
+      if (status /= 0 .and. len(failure) == 0) failure = last_failure()
+   end function write_and_close
+
+   !> Hand all bytes to the system: in one call, unless it takes less.
+   function write_all(descriptor, data, bytes) result(failure)
       integer(c_int), intent(in) :: descriptor
       type(c_ptr), intent(in) :: data
       integer(c_size_t), intent(in) :: bytes
@@ -217,7 +243,6 @@ contains
       character(kind=c_char), pointer :: rest(:)
       integer(c_size_t) :: done
       integer(c_long) :: written
-      integer(c_int) :: status
 
       failure = ''
       done = 0
@@ -226,16 +251,11 @@ contains
          written = posix_write(descriptor, c_loc(rest(done + 1)), bytes - done)
          if (written <= 0) then
             failure = last_failure()
-            exit
+            return
          end if
          done = done + written
       end do
-      if (len(failure) == 0) then
-         if (posix_fsync(descriptor) /= 0) failure = last_failure()
-      end if
-      status = posix_close(descriptor)
-      if (status /= 0 .and. len(failure) == 0) failure = last_failure()
-   end function write_and_close
+   end function write_all
 
    !> Append a text in one write and put it onto the disk.
    function append_text(path, text) result(failure)
@@ -247,7 +267,7 @@ contains
       if (path_exists(path)) then
          descriptor = posix_open(path//c_null_char, ior(o_wronly, o_append))
       else
-         descriptor = posix_creat(path//c_null_char, file_mode)
+         descriptor = create_file(path)
       end if
       if (descriptor < 0) then
          failure = last_failure()
@@ -263,26 +283,66 @@ contains
       inquire (file=path, size=bytes)
    end function file_bytes
 
-   !> A whole file as words. What is no whole number of words, or cannot be read, gives none.
-   subroutine read_words(path, words)
+   !> A whole file as words; none if it cannot be read.
+   subroutine read_words(path, words, torn)
       character(len=*), intent(in) :: path
       integer(i8), allocatable, intent(out) :: words(:)
+      logical, intent(out) :: torn !! it ends within a word, which is left out
       integer(i8) :: bytes
       integer :: unit, stat
 
-      bytes = file_bytes(path)
-      if (bytes <= 0 .or. modulo(bytes, 8_i8) /= 0) then
-         allocate (words(0))
-         return
-      end if
+      bytes = max(0_i8, file_bytes(path))
+      torn = modulo(bytes, 8_i8) /= 0
       allocate (words(bytes/8))
       open (newunit=unit, file=path, access='stream', form='unformatted', status='old', action='read', iostat=stat)
       if (stat == 0) then
-         read (unit, iostat=stat) words
+         if (size(words) > 0) read (unit, iostat=stat) words
          close (unit)
       end if
       if (stat /= 0) words = words(:0)
    end subroutine read_words
+
+   !> CRC-64 of all bytes of a file; `readable` is false if it cannot be read to its end.
+   subroutine file_checksum(path, crc, readable)
+      character(len=*), intent(in) :: path
+      integer(i8), intent(out) :: crc
+      logical, intent(out) :: readable
+      integer(i8), parameter :: block_bytes = 256*1024
+      character(len=block_bytes) :: block
+      integer(i8) :: bytes, done, n
+      integer :: unit, stat
+
+      crc = 0
+      done = 0
+      bytes = file_bytes(path)
+      open (newunit=unit, file=path, access='stream', form='unformatted', status='old', action='read', iostat=stat)
+      readable = stat == 0
+      if (.not. readable) return
+      do while (done < bytes .and. readable)
+         n = min(block_bytes, bytes - done)
+         read (unit, iostat=stat) block(:n)
+         readable = stat == 0
+         crc = crc64_text(block(:n), crc)
+         done = done + n
+      end do
+      close (unit)
+   end subroutine file_checksum
+
+   !> Give a file the first of the names STEM-1ENDING, STEM-2ENDING, ... that no file has.
+   subroutine rename_aside(path, stem, ending, name, failure)
+      character(len=*), intent(in) :: path
+      character(len=*), intent(in) :: stem, ending
+      character(len=:), allocatable, intent(out) :: name
+      character(len=:), allocatable, intent(out) :: failure !! empty on success
+      integer :: i
+
+      do i = 1, huge(i) - 1
+         name = stem//'-'//to_text(i)//ending
+         if (.not. path_exists(name)) exit
+      end do
+      failure = rename_over(path, name)
+      if (len(failure) == 0) failure = sync_path(parent_directory(name))
+   end subroutine rename_aside
 
    !> Open, perhaps make, a lock file. It is never removed: a lock is on its bytes and ends with the process.
    subroutine open_lock(self, path, error)
@@ -294,7 +354,7 @@ contains
       if (path_exists(path)) then
          self%descriptor = posix_open(path//c_null_char, o_wronly)
       else
-         self%descriptor = posix_creat(path//c_null_char, file_mode)
+         self%descriptor = create_file(path)
       end if
       if (self%descriptor < 0) call raise(error, path//': cannot be opened: '//last_failure())
    end subroutine open_lock

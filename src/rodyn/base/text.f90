@@ -4,7 +4,7 @@ module rodyn_text
    implicit none (type, external)
    private
    public :: lower, is_name, is_digit
-   public :: to_text, quoted, printable
+   public :: to_text, quoted, printable, ends_with
    public :: edit_distance, word_count, word
 
    !> A number as the shortest text (integer), or with 17 significant digits (real), or as T or F.
@@ -148,5 +148,14 @@ contains
       if (last < first) last = len_trim(list)
       text = list(first:last)
    end function word
+
+   !> Does a text, but for trailing blanks, end like this, with something in front?
+   pure logical function ends_with(text, ending)
+      character(len=*), intent(in) :: text, ending
+      integer :: n
+      n = len_trim(text)
+      ends_with = n > len(ending)
+      if (ends_with) ends_with = text(n - len(ending) + 1:n) == ending
+   end function ends_with
 
 end module rodyn_text

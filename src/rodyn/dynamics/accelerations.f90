@@ -59,6 +59,7 @@ contains
          dynamics%path = path_lumped
       else if (scene%dynamic_bending) then
          dynamics%path = path_flexible
+         dynamics%needs_moments = .false.
       else
          dynamics%path = path_rigid
       end if
@@ -92,7 +93,7 @@ contains
          select case (self%path)
          case (path_flexible)
             call flexible_accelerations(scene%n, scene%n_base, scene%rods, scene%rod_of, scene%node_mass, scene%body, &
-                                        work%sine, work%cosine, q, p, work%moment, self%forces%base, &
+                                        work%sine, work%cosine, q, p, scene%hinges, self%forces%base, &
                                         self%regime%on_nodes, self%forces%node, work%outward, acceleration, ok)
          case (path_rigid)
             call rigid_accelerations(scene%n, scene%n_base, scene%rods, scene%rod_of, scene%node_mass, scene%body, &

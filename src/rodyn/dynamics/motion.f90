@@ -16,6 +16,7 @@ module rodyn_motion
    use rodyn_accelerations, only: dynamics_type, new_dynamics
    use rodyn_assembled, only: assembled_system, new_assembled_system, mass_matrix
    use rodyn_linearisation, only: balance_tangent
+   use rodyn_newton, only: newton_type
    use rodyn_kinematics, only: load_power, damper_power, dissipated_power, invariants_type, invariants
    use rodyn_hinge_law, only: relaxation_rates, initial_joints, hinge_tangent
    use rodyn_lapack, only: dpotrf, dpotrs
@@ -28,6 +29,7 @@ module rodyn_motion
       type(dynamics_type) :: dynamics
       type(modes_finder), allocatable :: modes !! allocated when first needed
       type(assembled_system) :: system !! mass matrix of the Jacobian; allocated when first needed
+      type(newton_type) :: newton      !! linear systems of implicit methods
       integer :: n_q = 0               !! length of q
       logical :: free = .true.         !! the spacecraft moves
       logical :: ledger = .true.       !! y ends with work and dissipated energy
@@ -38,6 +40,8 @@ module rodyn_motion
       procedure :: lane_accelerations
       procedure :: find_modes
       procedure :: quadratures
+      procedure :: factorise_newton
+      procedure :: solve_newton
    end type motion_type
 
 contains
@@ -236,6 +240,35 @@ contains
          if (self%ledger) call power_rows(self, y(1:r), y(r + 1:r + m), jac(r + m + 1:, :))
       end associate
    end subroutine jacobian
+
+   !> Factor 1 - gamma J in O(n), J without the rows of the two powers.
+   subroutine factorise_newton(self, t, y, gamma, fresh, ok)
+      class(motion_type), intent(inout) :: self
+      real(wp), intent(in) :: t
+      real(wp), contiguous, intent(in) :: y(:)
+      real(wp), intent(in) :: gamma
+      logical, intent(in) :: fresh
+      logical, intent(out) :: ok
+      real(wp) :: a(self%n_dof)
+
+      ok = .true.
+      associate (r => self%n_q, m => self%n_dof, scene => self%dynamics%scene, work => self%dynamics%work)
+         if (fresh) then
+            call self%dynamics%accelerations(t, y(1:r), y(r + 1:r + m), a, ok)
+            if (.not. ok) return
+            call self%newton%linearise(scene, work%sine, work%cosine, y(1:r), y(r + 1:r + m), a, &
+                                       self%dynamics%regime%on_nodes, self%dynamics%forces%node)
+         end if
+         call self%newton%factorise(scene, gamma, ok)
+      end associate
+   end subroutine factorise_newton
+
+   !> x <- (1 - gamma J)^-1 x.
+   subroutine solve_newton(self, x)
+      class(motion_type), intent(inout) :: self
+      real(wp), contiguous, intent(inout) :: x(:)
+      call self%newton%solve(self%dynamics%scene, x)
+   end subroutine solve_newton
 
    !> Change of th' of the relaxing hinges.
    subroutine relaxation_column(self, dq, dp, column)

@@ -14,14 +14,15 @@ module rodyn_recursion_flexible
    use rodyn_kinds, only: wp
    use rodyn_rod_constants, only: rod_constants
    use rodyn_spacecraft, only: spacecraft_body, spacecraft_accelerations
+   use rodyn_hinge_law, only: hinge_law
    implicit none (type, external)
    private
    public :: flexible_accelerations
 
 contains
 
-   !> p' = (Vx', Vy', w', phi'', alpha'', beta'') for given q, p, hinge moments and loads.
-   pure subroutine flexible_accelerations(n, n_base, rods, rod_of, node_mass, body, sine, cosine, q, p, moment, &
+   !> p' = (Vx', Vy', w', phi'', alpha'', beta'') for given q, p and loads. The hinge moments are formed on the way.
+   pure subroutine flexible_accelerations(n, n_base, rods, rod_of, node_mass, body, sine, cosine, q, p, hinges, &
                                           base_force, loaded, node_force, outward, acceleration, ok)
       integer, intent(in) :: n, n_base              !! rods; 3 or 0 unknowns of the spacecraft
       type(rod_constants), intent(in) :: rods(*)    !! distinct rods
@@ -31,7 +32,7 @@ contains
       real(wp), intent(in) :: sine(0:n), cosine(0:n) !! of phi; 0 and 1 at k = 0
       real(wp), intent(in) :: q(n_base + 3*n)       !! coordinates
       real(wp), intent(in) :: p(n_base + 3*n)       !! rates
-      real(wp), intent(in) :: moment(0:n)           !! hinge moments T, T(n) = 0 [N m]
+      type(hinge_law), intent(in) :: hinges         !! springs, dampers and kinks
       real(wp), intent(in) :: base_force(3)         !! X_C, Y_C, M_C, moving axes
       logical, intent(in) :: loaded                 !! node_force is to be used
       real(wp), intent(in) :: node_force(2, *)      !! X, Y at nodes (n), moving axes [N]
@@ -42,7 +43,8 @@ contains
       integer :: k, ip, ia, ib
       real(wp) :: omega, omega_rate, w, w2, lw2, w_rate, alpha, beta, qa, qb
       real(wp) :: mv, mv_rate, mvv, mvv_rate, d, arm, outer, central, r0, gq, hq
-      real(wp) :: pee, pen, pnn, det, be, bn, mu, inv, ce, cn, r, ee, en, nn, cd, sd, ae, an, smallest, base_smallest
+      real(wp) :: pee, pen, pnn, det, be, bn, mu, inv, ce, cn, r, ee, en, nn, cd, sd, ae, an, smallest, base_smallest, &
+                  moment_in, moment_out, opening, opening_rate
 
       ip = n_base
       ia = n_base + n
@@ -56,6 +58,7 @@ contains
       be = 0.0_wp
       bn = 0.0_wp
       smallest = huge(1.0_wp)
+      moment_out = 0.0_wp
 
       inward: do k = n, 1, -1
          associate (rod => rods(rod_of(k)), i => rods(rod_of(k))%inertia)
@@ -68,6 +71,17 @@ contains
                be = be - (node_force(1, k)*cosine(k) + node_force(2, k)*sine(k))
                bn = bn - (node_force(2, k)*cosine(k) - node_force(1, k)*sine(k))
             end if
+
+            ! Moment of the inner hinge.
+            opening = q(ip + k) + q(ia + k)
+            if (k > 1) opening = opening - (q(ip + k - 1) + q(ib + k - 1))
+            moment_in = hinges%stiffness(k - 1)*opening
+            if (hinges%has_damping) then
+               opening_rate = p(ip + k) + p(ia + k)
+               if (k > 1) opening_rate = opening_rate - (p(ip + k - 1) + p(ib + k - 1))
+               moment_in = moment_in + hinges%damping(k - 1)*opening_rate
+            end if
+            if (hinges%has_kinks) moment_in = moment_in - hinges%stiffness(k - 1)*hinges%kink(k - 1)
 
             ! Deflection: int m v, its rate, int m v^2 and int m v v'.
             alpha = q(ia + k)
@@ -84,13 +98,15 @@ contains
             mvv_rate = p(ia + k)*qa + p(ib + k)*qb
 
             ! Moments on the slopes; the centrifugal part W^2 B (alpha, beta) leaves B^-1 as W^2 (alpha, beta).
-            qa = -moment(k - 1) - rod%kappa*(2.0_wp*alpha + beta)
-            qb = moment(k) - rod%kappa*(alpha + 2.0_wp*beta)
+            qa = -moment_in - rod%kappa*(2.0_wp*alpha + beta)
+            qb = moment_out - rod%kappa*(alpha + 2.0_wp*beta)
             gq = rod%g(1)*qa + rod%g(2)*qb
             hq = rod%h(1)*qa + rod%h(2)*qb
-            r0 = moment(k) - moment(k - 1) - hq - w2*(i%sa*alpha + i%sb*beta) - w*mvv_rate
+            r0 = moment_out - moment_in - hq - w2*(i%sa*alpha + i%sb*beta) - w*mvv_rate
             outward(4, k) = w2*alpha + rod%b_inverse(1)*qa + rod%b_inverse(2)*qb
             outward(5, k) = w2*beta + rod%b_inverse(2)*qa + rod%b_inverse(3)*qb
+
+            moment_out = moment_in
 
             ! Row of W'.
             d = rod%m2_reduced + mvv
@@ -136,7 +152,7 @@ contains
          be = r
       end do inward
 
-      call spacecraft_accelerations(n_base, body, p, node_mass(0), pee, pen, pnn, det, be, bn, moment(0), &
+      call spacecraft_accelerations(n_base, body, p, node_mass(0), pee, pen, pnn, det, be, bn, moment_out, &
                                     base_force, acceleration, ae, an, base_smallest)
       omega_rate = 0.0_wp
       if (n_base > 0) omega_rate = acceleration(3)

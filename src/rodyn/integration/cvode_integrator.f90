@@ -1,28 +1,27 @@
-!> CVODE: variable-order Adams (fixed-point iteration) and BDF (Newton with the exact, dense Jacobian).
+!> CVODE: variable-order Adams (fixed-point iteration) and BDF (Newton with the exact Jacobian, whose systems the
+!> system of equations solves itself).
 !>
 !> Steps are taken one at a time towards the stop time; outputs are interpolated by CVODE's own polynomial, so
 !> neither their number nor their times change a step.
 module rodyn_cvode_integrator
-   use, intrinsic :: iso_c_binding, only: c_ptr, c_int, c_long, c_int64_t, c_double, c_null_ptr, c_associated, c_loc, &
-      c_funloc, c_f_pointer
+   use, intrinsic :: iso_c_binding, only: c_ptr, c_int, c_long, c_double, c_null_ptr, c_associated, c_loc, c_funloc
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type, raise
    use rodyn_ode, only: ode_system
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, time_text
    use rodyn_nvector, only: new_nvector, free_nvector, vector_content, content_of
+   use rodyn_newton_solver, only: new_newton_matrix, new_newton_solver, linear_system_shim
    use rodyn_sundials_base, only: callback_data, rhs_shim, weights_shim, quiet_handler, all_finite, raise_return_code
    use fsundials_context_mod, only: FSUNContext_Create, FSUNContext_Free
    use fsundials_nvector_mod, only: N_Vector
    use fsundials_matrix_mod, only: SUNMatrix, FSUNMatDestroy
    use fsundials_linearsolver_mod, only: SUNLinearSolver, FSUNLinSolFree
    use fsundials_nonlinearsolver_mod, only: SUNNonlinearSolver, FSUNNonlinSolFree
-   use fsunmatrix_dense_mod, only: FSUNDenseMatrix
-   use fsunlinsol_dense_mod, only: FSUNLinSol_Dense
    use fsunnonlinsol_fixedpoint_mod, only: FSUNNonlinSol_FixedPoint
    use fcvode_mod, only: CV_ADAMS, CV_BDF, CV_SUCCESS, CV_TSTOP_RETURN, CV_ONE_STEP, FCVodeCreate, FCVodeInit, FCVodeReInit, &
       FCVodeFree, FCVode, FCVodeGetDky, FCVodeSetUserData, FCVodeWFtolerances, FCVodeSetErrHandlerFn, FCVodeSetMaxOrd, &
       FCVodeSetMaxStep, FCVodeSetStopTime, FCVodeSetStabLimDet, FCVodeSetNonlinearSolver, FCVodeSetLinearSolver, &
-      FCVodeSetJacFn, FCVodeGetNumErrTestFails, FCVodeGetNumNonlinSolvConvFails, FCVodeGetLastOrder, FCVodeGetLastStep, &
+      FCVodeSetLinSysFn, FCVodeGetNumErrTestFails, FCVodeGetNumNonlinSolvConvFails, FCVodeGetLastOrder, FCVodeGetLastStep, &
       FCVodeGetNumJacEvals
    implicit none (type, external)
    private
@@ -51,13 +50,6 @@ module rodyn_cvode_integrator
    end type cvode_integrator
 
    interface
-      function dense_data(matrix) result(address) bind(c, name='SUNDenseMatrix_Data')
-         import :: SUNMatrix, c_ptr
-         implicit none (type, external)
-         type(SUNMatrix), intent(in) :: matrix
-         type(c_ptr) :: address
-      end function dense_data
-
       !> The caller frees the text; the Fortran interface of SUNDIALS would lose it.
       function flag_name(flag) result(text) bind(c, name='CVodeGetReturnFlagName')
          import :: c_ptr, c_long
@@ -169,22 +161,20 @@ contains
       call check(error, FCVodeSetNonlinearSolver(self%memory, self%nonlinear), 'CVodeSetNonlinearSolver')
    end subroutine attach_fixed_point
 
-   !> BDF: CVODE's own Newton iteration on a dense matrix.
+   !> BDF: CVODE's own Newton iteration on the system's linear solver.
    subroutine attach_newton(self, error)
       class(cvode_integrator), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
-      integer(c_int64_t) :: n
 
-      n = int(self%system%n_states, c_int64_t)
-      self%matrix => FSUNDenseMatrix(n, n, self%context)
-      if (associated(self%matrix)) self%linear => FSUNLinSol_Dense(self%state, self%matrix, self%context)
+      self%matrix => new_newton_matrix(self%context)
+      if (associated(self%matrix)) self%linear => new_newton_solver(self%data, self%context)
       if (.not. associated(self%linear)) then
-         call raise(error, 'SUNLinSol_Dense: out of memory')
+         call raise(error, 'SUNLinSolNewEmpty: out of memory')
          return
       end if
       call check(error, FCVodeSetLinearSolver(self%memory, self%linear, self%matrix), 'CVodeSetLinearSolver')
       if (allocated(error)) return
-      call check(error, FCVodeSetJacFn(self%memory, c_funloc(jacobian_shim)), 'CVodeSetJacFn')
+      call check(error, FCVodeSetLinSysFn(self%memory, c_funloc(linear_system_shim)), 'CVodeSetLinSysFn')
       if (allocated(error) .or. .not. self%options%stability_limit_detection) return
       call check(error, FCVodeSetStabLimDet(self%memory, 1_c_int), 'CVodeSetStabLimDet')
    end subroutine attach_newton
@@ -321,31 +311,6 @@ contains
       type(cvode_integrator), intent(inout) :: self
       call self%finalize()
    end subroutine finalize_handles
-
-   !> CVLsJacFn: the exact Jacobian, straight into the dense matrix (column-major in both worlds).
-   function jacobian_shim(t, y, rates, jacobian, user_data, work1, work2, work3) result(flag) bind(c)
-      real(c_double), intent(in), value :: t
-      type(N_Vector), intent(in) :: y, rates
-      type(SUNMatrix), intent(in) :: jacobian
-      type(c_ptr), intent(in), value :: user_data
-      type(N_Vector), intent(in) :: work1, work2, work3
-      integer(c_int) :: flag
-
-      type(callback_data), pointer :: data
-      type(vector_content), pointer :: states
-      real(c_double), pointer, contiguous :: values(:, :)
-      logical :: ok
-
-      associate (unused => rates, u1 => work1, u2 => work2, u3 => work3); end associate
-      call c_f_pointer(user_data, data)
-      states => content_of(y)
-      call c_f_pointer(dense_data(jacobian), values, [size(states%values), size(states%values)])
-      call data%system%jacobian(t, states%values, values, ok)
-      ! Nothing depends on the quadratures. Without their rows the elimination of the others is the same to the
-      ! last bit as in a system without them; their own last correction is within the tolerance of the iteration.
-      values(data%system%n_controlled + 1:, :) = 0.0_c_double
-      flag = merge(0_c_int, 1_c_int, ok)
-   end function jacobian_shim
 
    !> A negative return code becomes a message that names the call, the time and the code.
    subroutine check(error, flag, call_name, t)

@@ -20,7 +20,8 @@ module rodyn_gauss_integrator
    use rodyn_ode, only: ode_system, mechanical_system, stiff_modes
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, time_text
    use rodyn_trigonometry, only: sine_cosine
-   use rodyn_lane_algebra, only: apply, apply_one, apply_both, project, expand, combine, square_sums, straight_lines, subtract, add
+   use rodyn_lane_algebra, only: apply, apply_one, apply_both, project, expand, combine, square_sums, straight_lines, &
+      subtract, correct
    use rodyn_gauss_collocation, only: gauss_collocation, new_gauss_collocation
    implicit none (type, external)
    private
@@ -31,7 +32,7 @@ module rodyn_gauss_integrator
    real(wp), parameter :: error_constant = 0.5_wp   !! of the error estimate, see `error_estimate`
    real(wp), parameter :: wanted_estimate = 0.3_wp, largest_estimate = 4.0_wp !! of the error, in tolerances
    real(wp), parameter :: first_phase = 2.0_wp      !! fastest frequency times the first step
-   real(wp), parameter :: smallest_phase = 0.25_wp  !! slower vibrations need no implicit treatment
+   real(wp), parameter :: smallest_phase = 0.2_wp  !! slower vibrations need no implicit treatment
    real(wp), parameter :: search_cost = 40.0_wp     !! finding modes, in iterations
 
    !> The matrices of one step length.
@@ -47,7 +48,7 @@ module rodyn_gauss_integrator
    !> What is kept of a step.
    type :: step_record
       real(wp), allocatable :: f(:, :)       !! F (s, n_dof)
-      real(wp), allocatable :: a(:, :)       !! last accelerations (s, n_dof)
+      real(wp), allocatable :: a(:, :)       !! accelerations of the last evaluation (s, n_dof)
       real(wp), allocatable :: q(:, :), p(:, :) !! at the nodes (s, n_dof)
       real(wp), allocatable :: smooth(:, :)  !! accelerations without the stiff part (s, n_dof)
       real(wp) :: h = 0.0_wp                 !! step [s]
@@ -371,11 +372,13 @@ contains
       end associate
    end subroutine set_weights
 
-   !> First guess of F: extrapolate what is smooth, solve the stiff modes with it.
+   !> First guess of F: extrapolate what is smooth, N, and solve the stiff modes with it. With Q = q + c h p, P = p the
+   !> residual for F = 0 is R = N - sum u stiff, stiff = omega^2 v.Q + damping v.P, and F = R - sum u G R.v.
    subroutine predict(self, ok)
       class(gauss_integrator), intent(inout) :: self
       logical, intent(out) :: ok
-      integer :: m
+      real(wp) :: rest, motion, stiff(s)
+      integer :: i, m
 
       m = self%mechanics%n_dof
       ok = .true.
@@ -389,12 +392,15 @@ contains
          self%now%ahead = self%rule%interpolation(1.0_wp, self%now%h/self%last%h)
       end if
       call apply(m, self%now%ahead, self%last%smooth, self%trial%f)
-      call straight_lines(m, self%y, self%y(m + 1:), self%now%h, self%rule%c, self%trial%q)
-      call straight_lines(m, self%y(m + 1:), self%y(m + 1:), 0.0_wp, self%rule%c, self%trial%p)
-      call stiff_rates(self, self%trial%q, self%trial%p)
-      self%modal = -self%modal
-      call expand(m, self%modes%n, self%modes%u, self%modal, self%trial%f) ! the residual for F = 0
-      call answer(self, self%trial%f)
+      call project(m, self%modes%n, self%modes%v, self%trial%f, self%modal)
+      do i = 1, self%modes%n
+         rest = dot_product(self%modes%v(:, i), self%y(:m))
+         motion = dot_product(self%modes%v(:, i), self%y(m + 1:2*m))
+         stiff = self%modes%omega_2(i)*(rest + (self%now%h*motion)*self%rule%c) + self%modes%damping(i)*motion
+         self%reply(:, i) = -stiff
+         call apply_one(self%now%g(:, :, i), self%modal(:, i) - stiff, self%reply(:, i))
+      end do
+      call expand(m, self%modes%n, self%modes%u, self%reply, self%trial%f)
    end subroutine predict
 
    !> Before the first step: the smooth part is taken to be constant.
@@ -406,7 +412,7 @@ contains
          self%last%q(:, :) = spread(self%y(:m), 1, s)
          self%last%p(:, :) = spread(self%y(m + 1:2*m), 1, s)
       end associate
-      call self%mechanics%lane_accelerations(spread(self%t, 1, s), self%last%q, self%last%p, self%last%a, ok)
+      call self%mechanics%lane_accelerations(spread(self%t, 1, s), self%last%q, self%last%p, self%last%f, ok)
       self%refused = .not. ok
       self%counts%n_rhs = self%counts%n_rhs + 1
       if (.not. ok) return
@@ -415,12 +421,12 @@ contains
       self%has_history = .true.
    end subroutine begin_history
 
-   !> smooth = a + sum u (omega^2 v.Q + damping v.P).
+   !> smooth = F + sum u (omega^2 v.Q + damping v.P).
    subroutine remove_stiff_part(self, record)
       class(gauss_integrator), intent(inout) :: self
       type(step_record), intent(inout) :: record
       call stiff_rates(self, record%q, record%p)
-      record%smooth(:, :) = record%a
+      record%smooth(:, :) = record%f
       call expand(self%mechanics%n_dof, self%modes%n, self%modes%u, self%modal, record%smooth)
    end subroutine remove_stiff_part
 
@@ -439,25 +445,13 @@ contains
       end associate
    end subroutine stiff_rates
 
-   !> R becomes dF = R - sum u G R.v.
-   subroutine answer(self, r)
-      class(gauss_integrator), intent(inout) :: self
-      real(wp), contiguous, intent(inout) :: r(:, :)
-
-      associate (n => self%modes%n, m => size(r, 2))
-         call project(m, n, self%modes%v, r, self%modal)
-         call combine(n, self%now%g, self%modal, self%reply)
-         call expand(m, n, self%modes%u, self%reply, r)
-      end associate
-   end subroutine answer
-
-   !> Solve for F of `trial` from its first guess. Leaves Q, P and accelerations of the last evaluation there.
+   !> Solve for F of `trial` from its first guess. Q and P follow.
    subroutine iterate(self, t, y, ok)
       class(gauss_integrator), intent(inout) :: self
       real(wp), contiguous, intent(in) :: y(:)
       real(wp), intent(in) :: t
       logical, intent(out) :: ok
-      real(wp) :: change, before, times(s)
+      real(wp) :: change, before, times(s), sums(s)
       integer :: j, m
 
       m = self%mechanics%n_dof
@@ -471,9 +465,11 @@ contains
          self%refused = .not. ok
          if (.not. ok) return
          call subtract(m, self%trial%a, self%trial%f, self%guess)
-         call answer(self, self%guess)
-         call add(m, self%guess, self%trial%f)
-         change = self%now%h*weighted_norm(self%guess, self%weight)
+         call project(m, self%modes%n, self%modes%v, self%guess, self%modal)
+         call combine(self%modes%n, self%now%g, self%modal, self%reply)
+         call correct(m, self%modes%n, self%modes%u, self%reply, self%now%h_a, self%now%h2_a2, self%weight, self%guess, &
+                      self%trial%f, self%trial%p, self%trial%q, sums)
+         change = self%now%h*sqrt(sum(sums)/real(s*m, wp))
          if (.not. ieee_is_finite(change)) exit
          if (j > 1) then
             if (change > 0.5_wp*before) then ! no progress: at the level of rounding, or hopeless
@@ -483,7 +479,6 @@ contains
             self%rate = min(1.0_wp, max(1.0e-4_wp, change/before))
          end if
          if (self%rate*change <= iteration_error) return
-         call apply_both(m, self%now%h_a, self%now%h2_a2, self%guess, self%trial%p, self%trial%q)
          before = change
       end do
       ok = .false.
@@ -529,7 +524,7 @@ contains
       real(wp), contiguous, intent(in) :: y(:)
       real(wp), intent(in) :: t !! at the start of the step
       real(wp), intent(out), optional :: estimate
-      real(wp) :: sums(s), high, low
+      real(wp) :: sums(s), high, low, ratio
       integer :: j, m
 
       m = self%mechanics%n_dof
@@ -547,7 +542,9 @@ contains
       high = sums(8) + sums(7)
       low = sums(6) + sums(5)
       estimate = 0.0_wp
-      if (high > 0.0_wp) estimate = error_constant*self%now%h*sqrt(high/real(m, wp))*min(1.0_wp, high/low)**2.25_wp
+      if (.not. high > 0.0_wp) return
+      ratio = min(1.0_wp, high/low)
+      estimate = error_constant*self%now%h*sqrt(high/real(m, wp))*ratio**2*sqrt(sqrt(ratio))
    end subroutine form_increment
 
    !> Coefficients of F in shifted Legendre polynomials, one polynomial to a lane.

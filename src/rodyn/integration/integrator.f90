@@ -28,7 +28,7 @@ module rodyn_integrator
       real(wp) :: max_step = 0.0_wp      !! [s]; 0: no bound
       real(wp) :: fixed_step = 0.0_wp    !! [s], one-step methods only; 0: adaptive
       integer :: max_steps = 1000000000  !! internal steps of the whole run, restarts included
-      logical :: stability_limit_detection = .false. !! BDF: lower the order where orders 3 to 5 are unstable
+      logical :: stability_limit_detection = .true. !! BDF: lower the order where orders 3 to 5 are unstable
    end type solver_options
 
    !> Counts over the whole run, restarts included.

@@ -6,7 +6,7 @@ module rodyn_lane_algebra
    use rodyn_lanes, only: s => lanes
    implicit none (type, external)
    private
-   public :: apply, apply_one, apply_both, project, expand, combine, square_sums, straight_lines, subtract, add
+   public :: apply, apply_one, apply_both, project, expand, combine, square_sums, straight_lines, subtract, correct
 
 contains
 
@@ -189,6 +189,45 @@ contains
       call apply_one(matrices(:, :, m), z(:, m), y(:, m))
    end subroutine combine
 
+   !> One correction: dF = R + U z is added to F, h A dF to P, h^2 A^2 dF to Q; (weight_j dF(:, j))^2 is summed lane by lane.
+   pure subroutine correct(n, m, u, z, h_a, h2_a2, weight, r, f, p, q, sums)
+      integer, intent(in) :: n, m
+      real(wp), intent(in) :: u(m, n), z(s, m), h_a(s, s), h2_a2(s, s), weight(n)
+      real(wp), intent(inout) :: r(s, n) !! R, then dF
+      real(wp), intent(inout) :: f(s, n), p(s, n), q(s, n)
+      real(wp), intent(out) :: sums(s)
+      real(wp), dimension(s) :: d_1, d_2
+      integer :: i, j, l
+
+      sums = 0.0_wp
+      do j = 1, n - 1, 2
+         d_1 = r(:, j)
+         d_2 = r(:, j + 1)
+         do i = 1, m
+            !$omp simd
+            do l = 1, s
+               d_1(l) = d_1(l) + u(i, j)*z(l, i)
+               d_2(l) = d_2(l) + u(i, j + 1)*z(l, i)
+            end do
+         end do
+         !$omp simd
+         do l = 1, s
+            r(l, j) = d_1(l)
+            r(l, j + 1) = d_2(l)
+            f(l, j) = f(l, j) + d_1(l)
+            f(l, j + 1) = f(l, j + 1) + d_2(l)
+            sums(l) = sums(l) + (weight(j)*d_1(l))**2 + (weight(j + 1)*d_2(l))**2
+         end do
+         call apply_both(2, h_a, h2_a2, r(:, j:j + 1), p(:, j:j + 1), q(:, j:j + 1))
+      end do
+      if (modulo(n, 2) == 0) return
+      call expand(1, m, u(:, n:n), z, r(:, n:n))
+      f(:, n) = f(:, n) + r(:, n)
+      sums = sums + (weight(n)*r(:, n))**2
+      call apply_one(h_a, r(:, n), p(:, n))
+      call apply_one(h2_a2, r(:, n), q(:, n))
+   end subroutine correct
+
    !> Lane by lane, sum of (weight_j x(:, j))^2.
    pure function square_sums(n, x, weight) result(sums)
       integer, intent(in) :: n
@@ -222,13 +261,5 @@ contains
       real(wp), intent(out) :: z(s, n)
       z = x - y
    end subroutine subtract
-
-   !> y = y + x.
-   pure subroutine add(n, x, y)
-      integer, intent(in) :: n
-      real(wp), intent(in) :: x(s, n)
-      real(wp), intent(inout) :: y(s, n)
-      y = y + x
-   end subroutine add
 
 end module rodyn_lane_algebra

@@ -1,72 +1,77 @@
 !> Which integrator fits a scene, and why: the rule behind `method = 'auto'`.
 !>
-!> The scene's spectrum decides. Lightly damped vibrations must be followed by any method that is to be accurate,
-!> so the cheapest steps win: the explicit method of order 8 (docs/performance.md). Dampers so strong that they
-!> alone bound an explicit step far below what the vibrations need call for BDF, while the chain is short enough
-!> for a dense Jacobian.
+!> The measure is the time to the end of the run at the user's tolerances, by which all methods bring the chord angles to some
+!> ten times rtol or better (docs/performance.md, "Large and stiff"). Vibrations that the tolerances resolve must be followed
+!> by any method, and the cheapest steps win: explicit, order 8. Strong dampers, or rods so stiff that their vibrations drown
+!> in the tolerances, call for BDF. How much of a fast vibration is excited depends on loads and initial values, so where the
+!> fastest rates are far above those of the chain of rods, the methods are tried on the beginning of the run.
 module rodyn_method_choice
    use rodyn_kinds, only: wp
-   use rodyn_errors, only: error_type
    use rodyn_case_config, only: solver_config
    use rodyn_scene, only: scene_type
-   use rodyn_frequencies, only: natural_frequencies, decay_rates
-   use rodyn_integrator, only: time_text
+   use rodyn_fastest_rates, only: fastest_rates, with_rigid_rods
+   use rodyn_integrator, only: solver_options, time_text
+   use rodyn_method_trial, only: candidates, try_methods
    implicit none (type, external)
    private
    public :: method_choice, choose_method
 
    type :: method_choice
-      character(len=:), allocatable :: method !! 'adams', 'bdf', 'erk' or 'dop853'
+      character(len=:), allocatable :: method !! name of an integrator
       character(len=:), allocatable :: reason !! in words
+      type(solver_options) :: options         !! the user's, with the order that was chosen
+      real(wp) :: effort = 0.0_wp             !! of the trial, in right-hand sides
    end type method_choice
 
-   integer, parameter :: most_dof = 600            !! beyond, eigenvalues would cost more than they tell
-   integer, parameter :: most_dof_bdf = 300        !! beyond, a dense Jacobian costs more than small steps
-   real(wp), parameter :: stiff_ratio = 20.0_wp    !! decay rate over highest frequency from where BDF is cheaper
-   real(wp), parameter :: stability_limit = 6.0_wp !! step times frequency (decay rate) that order 8 bears
+   real(wp), parameter :: vibration_limit = 3.0_wp !! step times frequency that order 8 takes
+   real(wp), parameter :: stability_limit = 6.0_wp !! step times decay rate that it bears
+   real(wp), parameter :: stages = 12.0_wp         !! right-hand sides of its step
+   real(wp), parameter :: long_run = 5000.0_wp     !! right-hand sides of an explicit run that are worth a trial
+   real(wp), parameter :: stiff_ratio = 200.0_wp   !! fastest rate over the chain's frequencies from where implicit steps may pay
+   real(wp), parameter :: trial_share = 0.3_wp     !! of an explicit run, spent on one candidate at most
+   real(wp), parameter :: lead = 1.1_wp            !! by which an implicit method must be faster: it is less accurate
 
 contains
 
    !> The user's method, or the one that fits.
-   subroutine choose_method(choice, solver, scene, q, t_end)
+   subroutine choose_method(choice, solver, options, scene, y, t_end)
       type(method_choice), intent(out) :: choice
       type(solver_config), intent(in) :: solver
+      type(solver_options), intent(in) :: options !! of the user
       type(scene_type), intent(in) :: scene
-      real(wp), intent(in) :: q(:)  !! initial coordinates (dof)
+      real(wp), intent(in) :: y(:)  !! state at t = 0, without quadratures
       real(wp), intent(in) :: t_end !! [s]
-      type(error_type), allocatable :: unknown
-      real(wp), allocatable :: frequency(:), decay(:)
-      real(wp) :: lowest, highest, fastest
+      real(wp) :: frequency, decay, slow, unused, explicit, forecast(size(candidates))
+      integer :: best
 
       choice%method = trim(solver%method)
       choice%reason = 'chosen by the case'
+      choice%options = options
       if (solver%method /= 'auto') return
       choice%method = 'dop853'
-      if (scene%n_dof > most_dof) then
-         choice%reason = 'auto: explicit, order 8 (too many unknowns for a look at the frequencies)'
+      call fastest_rates(scene, y(:scene%n_q), frequency, decay)
+      choice%reason = 'auto: frequencies to '//short(frequency)//' rad/s'
+      if (.not. frequency > 0.0_wp) choice%reason = 'auto: no vibrations'
+      if (decay > 0.0_wp) choice%reason = choice%reason//', dampers to '//short(decay)//' 1/s'
+      explicit = stages*t_end*max(frequency/vibration_limit, decay/stability_limit)
+      call fastest_rates(with_rigid_rods(scene), y(:scene%n_base + scene%n + scene%n_q - scene%n_dof), slow, unused)
+      if (explicit < long_run .or. max(frequency, decay) < stiff_ratio*slow) then
+         choice%reason = choice%reason//': explicit, order 8, about '//whole(explicit/stages)//' steps'
          return
       end if
-      call natural_frequencies(scene, q, frequency, unknown)
-      if (allocated(unknown)) then
-         choice%reason = 'auto: explicit, order 8 ('//unknown%message//')'
-         return
-      end if
-      highest = maxval(frequency)
-      lowest = minval(frequency, mask=frequency > 1.0e-6_wp*highest)
-      fastest = 0.0_wp
-      if (scene%hinges%has_damping) then
-         call decay_rates(scene, q, decay, unknown)
-         if (.not. allocated(unknown)) fastest = max(maxval(decay), scene%hinges%fastest_relaxation())
-      end if
-      choice%reason = 'auto: frequencies '//short(lowest)//' to '//short(highest)//' rad/s'
-      if (.not. highest > 0.0_wp) choice%reason = 'auto: no vibrations'
-      if (fastest > 0.0_wp) choice%reason = choice%reason//', dampers to '//short(fastest)//' 1/s'
-      if (fastest > stiff_ratio*highest .and. scene%n_dof <= most_dof_bdf) then
-         choice%method = 'bdf'
-         choice%reason = choice%reason//': stiff dampers, implicit'
+      call try_methods(scene, y, options, minval([t_end, pack(scene%loads%switches, scene%loads%switches > 0.0_wp)]), t_end, &
+                       trial_share, forecast, choice%effort)
+      forecast(1) = forecast(1)/lead
+      best = minloc(forecast, dim=1)
+      choice%method = trim(candidates(best)%method)
+      choice%options%order = candidates(best)%order
+      if (best == 1) then
+         choice%reason = choice%reason//': explicit, order 8, about '//whole(explicit/stages)//' steps'
       else
-         choice%reason = choice%reason//': explicit, order 8, at least '// &
-                         whole(t_end*max(highest, fastest)/stability_limit)//' steps'
+         choice%reason = choice%reason//': stiff, implicit, '
+         if (candidates(best)%order > 0) choice%reason = choice%reason//'order '//whole(real(candidates(best)%order, wp))//', '
+         choice%reason = choice%reason//'in a trial '//short(min(forecast(1)*lead/forecast(best), 1.0e9_wp))// &
+            ' times as fast as explicit'
       end if
    end subroutine choose_method
 

@@ -77,7 +77,7 @@ contains
       call c_f_pointer(vector%content, content)
    end function content_of
 
-   !> The dense linear solver accepts only the serial vector's number, and asks for no more than an array.
+   !> That of the serial vector.
    function vector_id(x) result(id) bind(c)
       type(N_Vector), intent(in) :: x
       integer(c_int) :: id

@@ -71,14 +71,14 @@ contains
       if (.not. allocated(error)) call new_motion(motion, scene, config%output%ledger, error)
       if (allocated(error)) return
       call initial_state(motion, config%initial, y)
-      call choose_method(choice, config%solver, scene, y(:scene%n_dof), config%t_end)
+      call choose_method(choice, config%solver, options_of(config), scene, y(:motion%n_controlled), config%t_end)
       header%notes = notes_on(scene, y(:scene%n_dof), config%output%ledger)
       if (.not. silent) then
          write (output_unit, '(a)') describe_scene(scene, config%output%ledger)
          write (output_unit, '(a)') 'method  '//choice%method//': '//choice%reason
          call print_notes(header%notes)
       end if
-      call new_integrator(integrator, motion, choice%method, options_of(config), error)
+      call new_integrator(integrator, motion, choice%method, choice%options, error)
       if (allocated(error)) return
 
       header%title = config%title

@@ -261,8 +261,8 @@ contains
       if (.not. allocated(error)) call new_motion(motion, scene, .false., error)
       if (allocated(error)) return
       call initial_state(motion, config%initial, y)
-      call choose_method(choice, config%solver, scene, y(:scene%n_dof), config%t_end)
-      call new_integrator(integrator, motion, choice%method, options_of(config), error)
+      call choose_method(choice, config%solver, options_of(config), scene, y, config%t_end)
+      call new_integrator(integrator, motion, choice%method, choice%options, error)
       if (allocated(error)) return
       monitor%pulse => pulse
       monitor%clock_start = clock_start

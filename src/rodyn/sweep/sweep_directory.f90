@@ -2,7 +2,7 @@
 !>
 !>     DIR/plan.txt      what the results depend on; a resumed sweep must have the same
 !>     DIR/lock          locked, never changed
-!>     DIR/shards/       sealed results        DIR/journal/   what was done to them
+!>     DIR/shards/       results               DIR/journal/   what was done to them
 !>     DIR/status*.txt   how far it is         DIR/sweep.h5   the result
 !>
 !> The lock file's bytes are locked: 0 while somebody looks around, 1 by a sweep with all cases, N * 2^20 + I by shard I
@@ -16,7 +16,7 @@ module rodyn_sweep_directory
    use rodyn_posix, only: path_exists, remove_file
    use rodyn_posix_files, only: list_directory, lock_file, lock_holder, make_directory, open_lock, release_lock, &
       take_lock, write_text_file
-   use rodyn_text, only: to_text
+   use rodyn_text, only: ends_with, to_text
    implicit none (type, external)
    private
    public :: sweep_directory, result_name
@@ -30,6 +30,7 @@ module rodyn_sweep_directory
       type(lock_file) :: lock
       integer(i8) :: fingerprint = 0 !! of the plan
       logical :: resumed = .false.   !! there was a plan already
+      integer, private :: looks = 0  !! calls of `look` without `look_no_more`
    contains
       procedure :: open => open_directory
       procedure :: lock_rank
@@ -67,14 +68,16 @@ contains
 
    !> Keep others from looking around until `look_no_more`.
    subroutine look(self)
-      class(sweep_directory), intent(in) :: self
+      class(sweep_directory), intent(inout) :: self
       logical :: taken
-      taken = take_lock(self%lock, looking, 1_i8, wait=.true.)
+      if (self%looks == 0) taken = take_lock(self%lock, looking, 1_i8, wait=.true.)
+      self%looks = self%looks + 1
    end subroutine look
 
    subroutine look_no_more(self)
-      class(sweep_directory), intent(in) :: self
-      call release_lock(self%lock, looking, 1_i8)
+      class(sweep_directory), intent(inout) :: self
+      self%looks = self%looks - 1
+      if (self%looks == 0) call release_lock(self%lock, looking, 1_i8)
    end subroutine look_no_more
 
    !> Nobody else may work on the same cases.
@@ -151,27 +154,30 @@ contains
       character(len=:), allocatable :: failure
 
       call remove_in('/shards/', '.shard')
+      call remove_in('/shards/', '.shard.open')
       call remove_in('/shards/', '.shard.tmp')
       call remove_in('/shards/', '.damaged')
       call remove_in('/journal/', '.txt')
-      call remove_in('/', '.h5')
-      call remove_in('/', '.txt')
-      failure = ''
+      call remove_in('/', '.h5', 'sweep-')
+      call remove_in('/', '.h5', 'sweep.')
+      call remove_in('/', '.h5.partial', 'sweep.')
+      call remove_in('/', '.txt', 'status')
+      call remove_in('/', '.txt', 'finished-s')
+      failure = remove_file(path//'/plan.txt')
 
    contains
 
-      subroutine remove_in(below, ending)
+      subroutine remove_in(below, ending, beginning)
          character(len=*), intent(in) :: below, ending
+         character(len=*), intent(in), optional :: beginning
          character(len=255), allocatable :: names(:)
-         integer :: i, n
+         integer :: i
          call list_directory(path//below, names)
          do i = 1, size(names)
-            n = len_trim(names(i))
-            if (n <= len(ending)) cycle
-            if (names(i)(n - len(ending) + 1:n) /= ending) cycle
-            if (below == '/' .and. .not. (index(names(i), 'sweep') == 1 .or. index(names(i), 'status') == 1 .or. &
-                                          index(names(i), 'finished-s') == 1 .or. &
-                                          names(i) == 'plan.txt')) cycle
+            if (.not. ends_with(names(i), ending)) cycle
+            if (present(beginning)) then
+               if (index(names(i), beginning) /= 1) cycle
+            end if
             failure = remove_file(path//below//trim(names(i)))
          end do
       end subroutine remove_in

@@ -8,21 +8,21 @@ module rodyn_sweep_engine
    use rodyn_errors, only: error_type, raise, exit_bad_input, exit_done, exit_failed, exit_stopped
    use rodyn_file_text, only: read_text_file
    use rodyn_lapack, only: use_one_thread
-   use rodyn_posix, only: ignore_file_size_signal, path_exists, rename_over
+   use rodyn_posix, only: ignore_file_size_signal, path_exists
    use rodyn_posix_files, only: stop_signal, watch_signals, write_text_file
    use rodyn_sweep_case, only: case_result, case_shape, new_case_shape, pulse_type, run_sweep_case, status_done, &
       status_failed, status_stopped
    use rodyn_sweep_config, only: sweep_config
    use rodyn_sweep_directory, only: sweep_directory, result_name
    use rodyn_sweep_forecast, only: print_forecast
-   use rodyn_sweep_index, only: notice_list, sweep_index
-   use rodyn_sweep_journal, only: write_journal
-   use rodyn_sweep_merge, only: merge_sweep
+   use rodyn_sweep_index, only: sweep_index
+   use rodyn_sweep_notices, only: notice_list
    use rodyn_sweep_plan, only: sweep_plan, new_plan, plan_text
    use rodyn_sweep_progress, only: sweep_counts, sweep_progress
    use rodyn_sweep_ranks, only: rank_group, at_done, at_errors, at_failed, at_next, at_stopped
    use rodyn_sweep_reader, only: find_base, parse_sweep
-   use rodyn_sweep_shard, only: shard_writer
+   use rodyn_sweep_result, only: result_is_sound, write_result
+   use rodyn_sweep_writer, only: shard_writer
    use rodyn_text, only: to_text
    implicit none (type, external)
    private
@@ -187,8 +187,8 @@ contains
          if (engine%options%n_shards > 0) engine%tag = shard_name(engine%options)
          call engine%directory%open(path, plan_text(engine%sweep), engine%options%shard, engine%options%n_shards, &
                                     engine%options%force, error)
-         if (.not. allocated(error)) call index%scan(path, engine%directory%fingerprint, engine%shape, engine%plan%n_cases, &
-                                                     engine%tag, other_shards(engine%options), notices, error)
+         if (.not. allocated(error)) call index%scan(engine%directory, engine%shape, engine%plan%n_cases, engine%tag, &
+                                                     other_shards(engine%options), .false., notices, error)
          if (.not. allocated(error)) call list_todo(engine, index)
          call tell_start(engine, notices, error)
          if (allocated(error)) fault = error%exit_code
@@ -217,6 +217,7 @@ contains
       end if
       call engine%ranks%share_word(number_of_shard) ! one rank reads the directory, not all
       engine%next_number = int(number_of_shard)
+      call engine%ranks%wait_for_all() ! nobody writes before all have their locks
    end subroutine open_sweep
 
    !> 's0003-of-0016'
@@ -321,7 +322,7 @@ contains
       if (engine%ranks%count > 1) chunk = max(1, min(16, n/(64*engine%ranks%count)))
       pulse%engine => engine
       call engine%writer%open(engine%directory%path, engine%tag, engine%next_number, engine%directory%fingerprint, &
-                              engine%shape, engine%plan%n_cases)
+                              engine%shape)
       hand_out: do
          first = engine%ranks%add(at_next, chunk)
          do i = int(min(first, int(n, i8))) + 1, int(min(first + chunk, int(n, i8)))
@@ -359,6 +360,7 @@ contains
       if (real(now - clock_last, wp) < 0.1_wp*real(rate, wp)) return
       clock_last = now
       call engine%ranks%poke()
+      call engine%writer%sync_if_due()
       call share_counts(engine)
       if (engine%ranks%rank == 0) call engine%progress%show(engine%counts)
    end subroutine look_around
@@ -428,7 +430,7 @@ contains
       end do
    end subroutine count_finished
 
-   !> Read all shards once more, count, and write sweep.h5 unless it is there and nothing has changed.
+   !> Read all shards once more, count, and write sweep.h5 unless it is there as it was merged from these results.
    subroutine verify_and_merge(engine, exit_code, error)
       type(engine_type), intent(inout) :: engine
       integer, intent(out) :: exit_code
@@ -436,13 +438,13 @@ contains
       type(sweep_index) :: index
       type(notice_list) :: notices
       type(sweep_counts) :: counts
-      character(len=:), allocatable :: path
+      character(len=:), allocatable :: aside, path
       integer :: i, n_missing
 
       exit_code = exit_failed
       path = engine%directory%path//'/'//result_name
-      call index%scan(engine%directory%path, engine%directory%fingerprint, engine%shape, engine%plan%n_cases, engine%tag, &
-                      '', notices, error)
+      call index%scan(engine%directory, engine%shape, engine%plan%n_cases, engine%tag, other_shards(engine%options), .true., &
+                      notices, error)
       if (allocated(error)) return
       do i = 1, notices%n
          write (error_unit, '(a)') engine%directory%path//': '//trim(notices%text(i))
@@ -464,14 +466,13 @@ contains
                     ' cases have no result; run again to resume')
          return
       end if
-      if (path_exists(path) .and. size(engine%todo) == 0 .and. notices%n == 0) then
-         if (.not. engine%options%quiet) write (output_unit, '(a)') 'done    nothing to compute; '//path//' is complete'
+      if (size(engine%todo) == 0 .and. result_is_sound(path, index)) then
+         if (.not. engine%options%quiet) write (output_unit, '(a)') 'done    nothing to compute; '//path//' is complete, verified'
       else
-         if (path_exists(path)) call move_aside(engine%directory%path, error)
-         if (.not. allocated(error)) call merge_sweep(path, engine%sweep, engine%plan, engine%shape, index, error)
-         if (.not. allocated(error)) call write_journal(engine%directory%path, engine%tag, 'merged', result_name, &
-                                                        engine%plan%n_cases, engine%directory%fingerprint, error)
+         call write_result(engine%directory%path, engine%tag, engine%sweep, engine%plan, engine%shape, index, aside, error)
          if (allocated(error)) return
+         if (size(engine%todo) == 0 .and. len(aside) > 0) write (error_unit, '(a)') path// &
+            ': not as it was merged from these results; set aside as '//aside//', merged again'
       end if
       exit_code = merge(exit_failed, exit_done, counts%failed > 0)
       call engine%progress%finish('done', counts)
@@ -479,21 +480,6 @@ contains
       call tell_end(engine, index, counts, error)
       call index%close()
    end subroutine verify_and_merge
-
-   !> Give an older sweep.h5 the next free name sweep-1.h5, sweep-2.h5, ...
-   subroutine move_aside(directory, error)
-      character(len=*), intent(in) :: directory
-      type(error_type), allocatable, intent(out) :: error
-      character(len=:), allocatable :: failure, name
-      integer :: i
-
-      do i = 1, huge(i) - 1
-         name = directory//'/sweep-'//to_text(i)//'.h5'
-         if (.not. path_exists(name)) exit
-      end do
-      failure = rename_over(directory//'/'//result_name, name)
-      if (len(failure) > 0) call raise(error, directory//'/'//result_name//': cannot be set aside: '//failure)
-   end subroutine move_aside
 
    !> Last lines: counts, costs, and the first cases that failed.
    subroutine tell_end(engine, index, counts, error)

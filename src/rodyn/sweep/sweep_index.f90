@@ -1,26 +1,24 @@
 !> Which results are on the disk: every shard read and verified, and where the result of each case stands.
 module rodyn_sweep_index
    use rodyn_kinds, only: i8
+   use rodyn_checksum, only: crc64
    use rodyn_errors, only: error_type, raise
-   use rodyn_posix, only: path_exists, rename_over
    use rodyn_posix_files, only: list_directory, read_words
    use rodyn_sweep_case, only: case_result, case_shape
-   use rodyn_sweep_journal, only: missing_shards, write_journal
-   use rodyn_sweep_record, only: at_attempt, at_case, at_status, check_shard, decode_record, header_words
-   use rodyn_text, only: to_text
+   use rodyn_sweep_directory, only: sweep_directory
+   use rodyn_sweep_journal, only: journal_content, read_journals, write_journal
+   use rodyn_sweep_mend, only: mend_shard
+   use rodyn_sweep_notices, only: notice_list
+   use rodyn_sweep_record, only: at_attempt, at_case, at_status, decode_record, is_sound, shortest_record
+   use rodyn_sweep_shard, only: header_words, shard_extent, sift_shard
+   use rodyn_sweep_writer, only: open_ending
+   use rodyn_text, only: ends_with, to_text
    implicit none (type, external)
    private
-   public :: sweep_index, notice_list
+   public :: sweep_index
 
    integer, parameter :: name_length = 255
    integer, parameter :: most_open = 64 !! files open at once while results are fetched
-   integer, parameter :: most_notices = 1000
-
-   !> What should be told of a directory.
-   type :: notice_list
-      integer :: n = 0
-      character(len=name_length) :: text(most_notices)
-   end type notice_list
 
    type :: sweep_index
       character(len=:), allocatable :: directory
@@ -32,80 +30,112 @@ module rodyn_sweep_index
       integer, allocatable, private :: units(:)   !! of each file; 0: closed
       integer, private :: n_open = 0
       integer(i8) :: bytes = 0                !! of all shards
-      integer :: n_damaged = 0                !! shards set aside now
-      integer :: n_gone = 0                   !! shards that are not there although the journal has them
+      type(journal_content), private :: journals
    contains
       procedure :: scan
       procedure :: next_number
+      procedure :: has_merged
+      procedure :: merge_mark
       procedure :: fetch
       procedure :: close => close_files
    end type sweep_index
 
 contains
 
-   !> Read all shards. Those that are damaged are set aside under another name, so that their cases count as missing.
-   subroutine scan(self, directory, fingerprint, shape, n_cases, tag, others, notices, error)
+   !> Read all shards. Those that are damaged, or left open by a dead process, are mended first.
+   subroutine scan(self, directory, shape, n_cases, tag, others, all_shards, notices, error)
       class(sweep_index), intent(out) :: self
-      character(len=*), intent(in) :: directory
+      type(sweep_directory), intent(inout) :: directory
+      type(case_shape), intent(in) :: shape
+      integer, intent(in) :: n_cases
+      character(len=*), intent(in) :: tag    !! ours; findings are noted in its journal
+      character(len=*), intent(in) :: others !! what the names of shards have whose writers may be alive, and ours; empty: none
+      logical, intent(in) :: all_shards      !! read those of living writers, too, as far as they are sealed
+      type(notice_list), intent(inout) :: notices
+      type(error_type), allocatable, intent(out) :: error
+      character(len=name_length), allocatable :: faulty(:)
+      integer :: i
+
+      self%directory = directory%path
+      do
+         call read_all(self, directory%fingerprint, shape, n_cases, tag, others, all_shards, faulty)
+         if (size(faulty) == 0) exit ! otherwise there are other files then
+         call directory%look()
+         do i = 1, size(faulty)
+            if (.not. allocated(error)) call mend_shard(self%directory, trim(faulty(i)), tag, directory%fingerprint, shape, &
+                                                        n_cases, notices, error)
+         end do
+         call directory%look_no_more()
+         if (allocated(error)) return
+      end do
+      if (all_shards .or. len(others) == 0) call tell_of_missing(self, tag, notices, error)
+   end subroutine scan
+
+   !> Read and verify, and list what has to be mended.
+   subroutine read_all(self, fingerprint, shape, n_cases, tag, others, all_shards, faulty)
+      class(sweep_index), intent(inout) :: self
       integer(i8), intent(in) :: fingerprint
       type(case_shape), intent(in) :: shape
       integer, intent(in) :: n_cases
-      character(len=*), intent(in) :: tag    !! journal in which findings are noted
-      character(len=*), intent(in) :: others !! do not read shards whose names end like this, unless they begin with `tag`
-      type(notice_list), intent(inout) :: notices
-      type(error_type), allocatable, intent(out) :: error
+      character(len=*), intent(in) :: tag, others
+      logical, intent(in) :: all_shards
+      character(len=name_length), allocatable, intent(out) :: faulty(:)
       character(len=name_length), allocatable :: names(:)
-      character(len=:), allocatable :: fault
       integer(i8), allocatable :: words(:)
+      logical, allocatable :: to_mend(:)
       integer :: i, n
 
-      self%directory = directory
-      allocate (self%status(n_cases), self%attempt(n_cases), self%file(n_cases), source=0)
-      allocate (self%at(n_cases), source=0_i8)
-      call list_directory(directory//'/shards', names)
+      call forget(self, n_cases)
+      call list_directory(self%directory//'/shards', names)
       allocate (self%files(size(names)))
+      allocate (to_mend(size(names)), source=.false.)
       n = 0
       do i = 1, size(names)
-         if (.not. ends_with(names(i), '.shard')) cycle
-         if (len(others) > 0) then
-            if (index(names(i), others) > 0 .and. index(names(i), tag//'-') /= 1) cycle
+         if (ends_with(names(i), '.shard'//open_ending)) then
+            to_mend(i) = .not. may_live(names(i))
+         else if (ends_with(names(i), '.shard') .and. (all_shards .or. .not. may_live(names(i)))) then
+            call read_sealed(self%directory//'/shards/'//trim(names(i)), to_mend(i))
+            if (to_mend(i)) cycle
+            n = n + 1
+            self%files(n) = names(i)
+            self%bytes = self%bytes + 8_i8*size(words)
+            call take(self, words, n)
          end if
-         call read_words(directory//'/shards/'//trim(names(i)), words)
-         fault = check_shard(words, fingerprint, shape, n_cases)
-         if (len(fault) > 0) then
-            call set_aside(self, trim(names(i)), tag, fault, notices, error)
-            if (allocated(error)) return
-            cycle
-         end if
-         n = n + 1
-         self%files(n) = names(i)
-         self%bytes = self%bytes + 8_i8*size(words)
-         call take(self, words, n)
       end do
       self%files = self%files(:n)
       allocate (self%units(n), source=0)
-      if (len(others) > 0) return
-      call tell_of_missing(self, tag, notices, error)
-   end subroutine scan
+      faulty = pack(names, to_mend)
 
-   !> Rename a damaged shard; its number is not used again.
-   subroutine set_aside(self, name, tag, fault, notices, error)
+   contains
+
+      !> Is its writer a neighbour, who may be alive?
+      pure logical function may_live(name)
+         character(len=*), intent(in) :: name
+         may_live = len(others) > 0
+         if (may_live) may_live = index(name, others) > 0 .and. index(name, tag//'-') /= 1
+      end function may_live
+
+      subroutine read_sealed(path, bad)
+         character(len=*), intent(in) :: path
+         logical, intent(out) :: bad
+         type(shard_extent) :: extent
+         character(len=:), allocatable :: fault
+         call read_words(path, words, bad)
+         if (bad) return
+         call sift_shard(words, fingerprint, shape, n_cases, extent, fault)
+         bad = len(fault) > 0 .or. .not. extent%sealed
+      end subroutine read_sealed
+
+   end subroutine read_all
+
+   subroutine forget(self, n_cases)
       class(sweep_index), intent(inout) :: self
-      character(len=*), intent(in) :: name, tag, fault
-      type(notice_list), intent(inout) :: notices
-      type(error_type), allocatable, intent(out) :: error
-      character(len=:), allocatable :: path, failure
-
-      path = self%directory//'/shards/'//name
-      failure = rename_over(path, path//'.damaged')
-      if (len(failure) > 0 .and. path_exists(path)) then
-         call raise(error, path//': is damaged ('//fault//') and cannot be set aside: '//failure)
-         return
-      end if
-      self%n_damaged = self%n_damaged + 1
-      call tell(notices, 'shard '//name//': '//fault//'; set aside, its cases are done again')
-      call write_journal(self%directory, tag, 'aside', name, 0, 0_i8, error)
-   end subroutine set_aside
+      integer, intent(in) :: n_cases
+      if (allocated(self%status)) deallocate (self%status, self%attempt, self%file, self%at, self%files, self%units)
+      allocate (self%status(n_cases), self%attempt(n_cases), self%file(n_cases), source=0)
+      allocate (self%at(n_cases), source=0_i8)
+      self%bytes = 0
+   end subroutine forget
 
    !> Shards that the journal knows but that are not there.
    subroutine tell_of_missing(self, tag, notices, error)
@@ -114,36 +144,43 @@ contains
       type(notice_list), intent(inout) :: notices
       type(error_type), allocatable, intent(out) :: error
       character(len=name_length), allocatable :: names(:)
-      integer :: i, n_lines
+      integer :: i
 
-      call missing_shards(self%directory, names, n_lines)
-      self%n_gone = size(names)
+      call read_journals(self%directory, self%journals)
+      call self%journals%missing(self%directory, names)
       do i = 1, size(names)
-         call tell(notices, 'shard '//trim(names(i))//': sealed, but not there; its cases are done again')
+         call notices%tell('shard '//trim(names(i))//': sealed, but not there; its cases are done again')
          call write_journal(self%directory, tag, 'gone', trim(names(i)), 0, 0_i8, error)
          if (allocated(error)) return
       end do
-      if (n_lines > 0) call tell(notices, 'journal: '//to_text(n_lines)//' damaged line(s) passed over')
+      if (self%journals%n_damaged > 0) call notices%tell('journal: '//to_text(self%journals%n_damaged)// &
+                                                         ' damaged line(s) passed over')
    end subroutine tell_of_missing
 
-   subroutine tell(notices, text)
-      type(notice_list), intent(inout) :: notices
-      character(len=*), intent(in) :: text
-      if (notices%n == most_notices) return
-      notices%n = notices%n + 1
-      notices%text(notices%n) = text
-   end subroutine tell
+   !> Was this the checksum of sweep.h5 when it was merged, and from these very results?
+   logical function has_merged(self, crc)
+      class(sweep_index), intent(in) :: self
+      integer(i8), intent(in) :: crc
+      has_merged = self%journals%has_merged(self%merge_mark(crc))
+   end function has_merged
 
-   !> Note the records of a shard. Of two results for a case the one of the later attempt counts.
+   !> What the journal has for a merge: checksum of sweep.h5, and of which attempt at each case is in it.
+   pure integer(i8) function merge_mark(self, crc)
+      class(sweep_index), intent(in) :: self
+      integer(i8), intent(in) :: crc !! of the file
+      merge_mark = crc64(int(self%status, i8), crc64(int(self%attempt, i8), crc))
+   end function merge_mark
+
+   !> Note the records of a sound shard. Of two results for a case the one of the later attempt counts.
    subroutine take(self, words, file)
       class(sweep_index), intent(inout) :: self
       integer(i8), intent(in) :: words(:)
       integer, intent(in) :: file
-      integer(i8) :: at, n
+      integer(i8) :: at
       integer :: case, attempt
 
       at = header_words + 1
-      do n = 1, words(3)
+      do while (words(at) > 0) ! up to the trailer
          case = int(words(at + at_case))
          attempt = int(words(at + at_attempt))
          if (attempt >= self%attempt(case)) then
@@ -181,7 +218,6 @@ contains
       type(case_result), intent(inout) :: kept !! its arrays are allocated
       type(error_type), allocatable, intent(out) :: error
       integer(i8), allocatable :: words(:)
-      integer(i8) :: length
       integer :: f, stat
 
       f = self%file(case)
@@ -192,17 +228,33 @@ contains
          if (stat /= 0) self%units(f) = 0
          if (stat == 0) self%n_open = self%n_open + 1
       end if
-      if (self%units(f) /= 0) read (self%units(f), pos=self%at(case), iostat=stat) length
-      if (stat == 0) then
-         allocate (words(length))
-         read (self%units(f), pos=self%at(case), iostat=stat) words
-      end if
-      if (stat == 0) then
+      if (self%units(f) /= 0) call read_record(self%units(f), self%at(case), self%bytes/8, words)
+      if (allocated(words)) then
          call decode_record(words, shape, kept)
       else
          call raise(error, self%directory//'/shards/'//trim(self%files(f))//': cannot be read any more; run again')
       end if
    end subroutine fetch
+
+   !> A record from its place in a file; not allocated if it is not as it was when it was verified.
+   subroutine read_record(unit, at, most, words)
+      integer, intent(in) :: unit
+      integer(i8), intent(in) :: at    !! first byte
+      integer(i8), intent(in) :: most  !! words it can have
+      integer(i8), allocatable, intent(out) :: words(:)
+      integer(i8) :: length
+      integer :: stat
+
+      read (unit, pos=at, iostat=stat) length
+      if (stat /= 0) return
+      if (length < shortest_record .or. length > most) return
+      allocate (words(length))
+      read (unit, pos=at, iostat=stat) words
+      if (stat == 0) then
+         if (is_sound(words)) return
+      end if
+      deallocate (words)
+   end subroutine read_record
 
    subroutine close_files(self)
       class(sweep_index), intent(inout) :: self
@@ -214,13 +266,5 @@ contains
       end do
       self%n_open = 0
    end subroutine close_files
-
-   pure logical function ends_with(name, ending)
-      character(len=*), intent(in) :: name, ending
-      integer :: n
-      n = len_trim(name)
-      ends_with = n > len(ending)
-      if (ends_with) ends_with = name(n - len(ending) + 1:n) == ending
-   end function ends_with
 
 end module rodyn_sweep_index

@@ -3,7 +3,7 @@
 !>     9F0C...  2025-01-31T23:59:59Z host 4711 sealed r0000-000001.shard 12 6A31...
 !>
 !> One file per writer, append only. Results do not depend on it (each shard proves itself); it tells which shards
-!> there should be, and what happened when.
+!> there should be, what checksum sweep.h5 has, and what happened when.
 module rodyn_sweep_journal
    use rodyn_kinds, only: i8
    use rodyn_checksum, only: crc64_text, hexadecimal
@@ -14,14 +14,27 @@ module rodyn_sweep_journal
    use rodyn_text, only: to_text
    implicit none (type, external)
    private
-   public :: write_journal, missing_shards
+   public :: write_journal, read_journals, journal_content
 
    integer, parameter :: name_length = 255
    character(len=*), parameter :: nl = new_line('a')
 
+   !> What all journals say.
+   type :: journal_content
+      integer :: n_damaged = 0 !! lines
+      integer, private :: n_sealed = 0, n_away = 0, n_merged = 0
+      character(len=name_length), allocatable, private :: sealed(:), away(:) !! names of shards
+      character(len=name_length), allocatable, private :: merged(:)          !! checksums
+   contains
+      procedure :: missing
+      procedure :: has_merged
+      procedure, private :: take_lines
+      procedure, private :: take
+   end type journal_content
+
 contains
 
-   !> Note one event: 'sealed', 'combined' (into another shard), 'aside' (damaged), 'gone', 'merged'.
+   !> Note one event: 'sealed', 'aside' (damaged), 'gone', 'merged'.
    subroutine write_journal(directory, tag, event, name, n_records, crc, error)
       character(len=*), intent(in) :: directory, tag
       character(len=*), intent(in) :: event, name
@@ -36,75 +49,85 @@ contains
       if (len(failure) > 0) call raise(error, directory//'/journal/'//tag//'.txt: cannot be written: '//failure)
    end subroutine write_journal
 
-   !> Shards that were sealed once but are not there, and how many lines are damaged.
-   subroutine missing_shards(directory, names, n_damaged)
+   subroutine read_journals(directory, content)
       character(len=*), intent(in) :: directory
-      character(len=name_length), allocatable, intent(out) :: names(:)
-      integer, intent(out) :: n_damaged
-      character(len=name_length), allocatable :: journals(:), away(:)
+      type(journal_content), intent(out) :: content
+      character(len=name_length), allocatable :: journals(:)
       character(len=:), allocatable :: text
       type(error_type), allocatable :: error
-      logical, allocatable :: missing(:)
-      integer :: i, n_away, n_sealed
+      integer :: i
 
-      n_damaged = 0
-      n_sealed = 0
-      n_away = 0
-      allocate (names(64), away(64))
+      allocate (content%sealed(64), content%away(64), content%merged(8))
       call list_directory(directory//'/journal', journals)
       do i = 1, size(journals)
          call read_text_file(directory//'/journal/'//trim(journals(i)), text, error)
-         if (allocated(error)) cycle
-         call read_lines(text)
+         if (.not. allocated(error)) call content%take_lines(text)
       end do
-      allocate (missing(n_sealed))
-      do i = 1, n_sealed
-         missing(i) = .not. path_exists(directory//'/shards/'//trim(names(i)))
-         if (missing(i)) missing(i) = .not. any(away(:n_away) == names(i))
-         if (missing(i)) missing(i) = .not. any(names(:i - 1) == names(i))
+   end subroutine read_journals
+
+   !> Shards that were sealed once, and not set aside, but are not there.
+   subroutine missing(self, directory, names)
+      class(journal_content), intent(in) :: self
+      character(len=*), intent(in) :: directory
+      character(len=name_length), allocatable, intent(out) :: names(:)
+      integer :: i, n
+
+      allocate (names(64))
+      n = 0
+      do i = 1, self%n_sealed
+         if (path_exists(directory//'/shards/'//trim(self%sealed(i)))) cycle
+         if (any(self%away(:self%n_away) == self%sealed(i)) .or. any(names(:n) == self%sealed(i))) cycle
+         call push(names, n, trim(self%sealed(i)))
       end do
-      names = pack(names(:n_sealed), missing)
+      names = names(:n)
+   end subroutine missing
 
-   contains
+   !> Has a result with this checksum been merged?
+   pure logical function has_merged(self, crc)
+      class(journal_content), intent(in) :: self
+      integer(i8), intent(in) :: crc
+      has_merged = any(self%merged(:self%n_merged) == hexadecimal(crc))
+   end function has_merged
 
-      subroutine read_lines(text)
-         character(len=*), intent(in) :: text
-         integer :: first, last
+   !> Take in the lines of one journal; damaged ones are counted.
+   subroutine take_lines(self, text)
+      class(journal_content), intent(inout) :: self
+      character(len=*), intent(in) :: text
+      integer :: first, last
 
-         first = 1
-         do while (first <= len(text))
-            last = index(text(first:), nl)
-            if (last == 0) then
-               n_damaged = n_damaged + 1
-               return
-            end if
-            last = first + last - 2
-            if (last < first + 17) then
-               n_damaged = n_damaged + 1
-            else if (text(first:first + 15) /= hexadecimal(crc64_text(text(first + 17:last)))) then
-               n_damaged = n_damaged + 1
-            else
-               call take(text(first + 17:last))
-            end if
-            first = last + 2
-         end do
-      end subroutine read_lines
+      first = 1
+      do while (first <= len(text))
+         last = index(text(first:), nl)
+         if (last == 0) then
+            self%n_damaged = self%n_damaged + 1
+            return
+         end if
+         last = first + last - 2
+         if (last < first + 17) then
+            self%n_damaged = self%n_damaged + 1
+         else if (text(first:first + 15) /= hexadecimal(crc64_text(text(first + 17:last)))) then
+            self%n_damaged = self%n_damaged + 1
+         else
+            call self%take(text(first + 17:last))
+         end if
+         first = last + 2
+      end do
+   end subroutine take_lines
 
-      subroutine take(line)
-         character(len=*), intent(in) :: line
-         character(len=:), allocatable :: event, name
-         event = field(line, 4)
-         name = field(line, 5)
-         select case (event)
-         case ('sealed')
-            call push(names, n_sealed, name)
-         case ('combined', 'aside', 'gone')
-            call push(away, n_away, name)
-         case default ! says nothing of a shard
-         end select
-      end subroutine take
+   subroutine take(self, line)
+      class(journal_content), intent(inout) :: self
+      character(len=*), intent(in) :: line
 
-   end subroutine missing_shards
+      select case (field(line, 4))
+      case ('sealed')
+         call push(self%sealed, self%n_sealed, field(line, 5))
+      case ('aside', 'gone')
+         call push(self%away, self%n_away, field(line, 5))
+      case ('merged')
+         call push(self%merged, self%n_merged, field(line, 7))
+      case default ! an event of a later version
+      end select
+   end subroutine take
 
    subroutine push(list, n, name)
       character(len=name_length), allocatable, intent(inout) :: list(:)

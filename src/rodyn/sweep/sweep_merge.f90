@@ -1,4 +1,4 @@
-!> From shards to `sweep.h5`, SPEC "Sweep file": written under a temporary name, case after case, and renamed.
+!> From shards to the content of `sweep.h5`, SPEC "Sweep file", case after case.
 !>
 !> What is in it depends on the sweep alone, not on who computed which case when; only `wall_seconds` differs.
 module rodyn_sweep_merge
@@ -9,7 +9,7 @@ module rodyn_sweep_merge
    use rodyn_errors, only: error_type, raise
    use rodyn_hdf5_files, only: hdf5_file, hdf5_version
    use rodyn_integrators, only: sundials_version
-   use rodyn_posix, only: ignore_file_size_signal, parent_directory, path_exists, remove_file, rename_new, sync_path
+   use rodyn_posix, only: ignore_file_size_signal, path_exists, remove_file, sync_path
    use rodyn_run_layout, only: i_alpha, i_alpha_rate, i_beta, i_beta_rate, i_displacement_x, i_displacement_y, i_omega, &
       i_phi, i_phi_rate, i_rotation, i_velocity_x, i_velocity_y, run_variables
    use rodyn_sweep_case, only: case_result, case_shape, status_done
@@ -42,9 +42,9 @@ module rodyn_sweep_merge
 
 contains
 
-   !> Write the result. All cases that are computed must have a result in the index.
+   !> Write the result, and put it onto the disk. All cases that are computed must have a result in the index.
    subroutine merge_sweep(path, sweep, plan, shape, index, error)
-      character(len=*), intent(in) :: path !! of sweep.h5; no file may have it
+      character(len=*), intent(in) :: path !! temporary; what a killed merge left there is written anew
       type(sweep_config), intent(in) :: sweep
       type(sweep_plan), intent(in) :: plan
       type(case_shape), intent(in) :: shape
@@ -52,13 +52,11 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(error_type), allocatable :: ignored
       type(hdf5_file) :: file
-      character(len=:), allocatable :: failure, temporary
-      logical :: taken
+      character(len=:), allocatable :: failure
 
       call ignore_file_size_signal()
-      temporary = path//'.partial'
-      if (path_exists(temporary)) failure = remove_file(temporary) ! left by a killed merge
-      call file%create(temporary, error)
+      if (path_exists(path)) failure = remove_file(path)
+      call file%create(path, error)
       if (allocated(error)) return
       call write_all(file, sweep, plan, shape, index, error)
       if (.not. allocated(error)) call file%flush(error)
@@ -69,15 +67,12 @@ contains
       end if
       call index%close()
       if (.not. allocated(error)) then
-         failure = sync_path(temporary)
-         taken = .false.
-         if (len(failure) == 0) call rename_new(temporary, path, taken, failure)
-         if (len(failure) == 0) failure = sync_path(parent_directory(path))
+         failure = sync_path(path)
          if (len(failure) > 0) call raise(error, path//': cannot be put onto the disk: '//failure)
       end if
       if (.not. allocated(error)) return
       error%message = error%message//'; all results are safe in the shards, run again to merge them'
-      failure = remove_file(temporary)
+      failure = remove_file(path)
    end subroutine merge_sweep
 
    !> Layout, then blocks of cases, then what coordinates belong to.

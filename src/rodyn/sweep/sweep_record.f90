@@ -1,21 +1,19 @@
-!> The result of a case as a run of 64-bit words, and a shard as a file of them.
+!> The result of a case as a run of 64-bit words that proves itself.
 !>
 !> Record: length in words; case; status; attempt; n_steps; n_rhs; t_reached; wall and integration seconds; bytes of the
-!> message; the message; and, if the case is done, final state, probes, times and series.
-!> Shard: magic; fingerprint of the plan; number of records; length in words; records; CRC-64 of all before it.
+!> message; the message; if the case is done, final state, probes, times and series; CRC-64 of all before it.
 module rodyn_sweep_record
    use rodyn_kinds, only: wp, i8
    use rodyn_checksum, only: crc64
    use rodyn_sweep_case, only: case_result, case_shape, status_done, status_failed
    implicit none (type, external)
    private
-   public :: append_record, decode_record, header_words, record_words, seal_words, check_shard
-   public :: at_case, at_status, at_attempt
+   public :: record_words, encode_record, decode_record, is_sound, fits_sweep
+   public :: shortest_record, at_case, at_status, at_attempt
 
-   integer(i8), parameter :: magic = 3551179902151839570_i8 !! 'RODYNSH1'
-   integer, parameter :: header_words = 4, trailer_words = 1
    integer, parameter :: at_case = 1, at_status = 2, at_attempt = 3 !! words behind the first of a record
    integer, parameter :: fixed_words = 10, message_at = 9
+   integer, parameter :: shortest_record = fixed_words + 1
 
 contains
 
@@ -23,45 +21,45 @@ contains
    pure integer function record_words(shape, status, message_length)
       type(case_shape), intent(in) :: shape
       integer, intent(in) :: status, message_length
-      record_words = fixed_words + (message_length + 7)/8
+      record_words = shortest_record + (message_length + 7)/8
       if (status == status_done) record_words = record_words + shape%n_states*(1 + shape%n_probes + shape%n_rows) + shape%n_rows
    end function record_words
 
-   !> Write a record behind the words in use. There must be room for it.
-   subroutine append_record(kept, shape, words, used)
+   !> Write a record into the first `n` words.
+   subroutine encode_record(kept, shape, words, n)
       type(case_result), intent(in) :: kept
       type(case_shape), intent(in) :: shape
-      integer(i8), intent(inout) :: words(:)
-      integer, intent(inout) :: used
-      integer :: at, i, n
+      integer(i8), intent(inout) :: words(:) !! with room for `record_words`
+      integer, intent(out) :: n
+      integer :: at, i
 
       n = record_words(shape, kept%status, len(kept%message))
-      at = used + 1
-      words(at) = n
-      words(at + at_case) = kept%case
-      words(at + at_status) = kept%status
-      words(at + at_attempt) = kept%attempt
-      words(at + 4) = kept%n_steps
-      words(at + 5) = kept%n_rhs
-      words(at + 6) = transfer(kept%t_reached, 0_i8)
-      words(at + 7) = transfer(kept%wall_seconds, 0_i8)
-      words(at + 8) = transfer(kept%integration_seconds, 0_i8)
-      words(at + message_at) = len(kept%message)
-      at = at + fixed_words
+      words(1) = n
+      words(1 + at_case) = kept%case
+      words(1 + at_status) = kept%status
+      words(1 + at_attempt) = kept%attempt
+      words(5) = kept%n_steps
+      words(6) = kept%n_rhs
+      words(7) = transfer(kept%t_reached, 0_i8)
+      words(8) = transfer(kept%wall_seconds, 0_i8)
+      words(9) = transfer(kept%integration_seconds, 0_i8)
+      words(1 + message_at) = len(kept%message)
+      at = fixed_words + 1
       do i = 1, len(kept%message), 8
          words(at) = packed(kept%message(i:min(i + 7, len(kept%message))))
          at = at + 1
       end do
-      used = used + n
-      if (kept%status /= status_done) return
-      call put(kept%final)
-      do i = 1, shape%n_probes
-         call put(kept%probes(:, i))
-      end do
-      call put(kept%times)
-      do i = 1, shape%n_rows
-         call put(kept%series(:, i))
-      end do
+      if (kept%status == status_done) then
+         call put(kept%final)
+         do i = 1, shape%n_probes
+            call put(kept%probes(:, i))
+         end do
+         call put(kept%times)
+         do i = 1, shape%n_rows
+            call put(kept%series(:, i))
+         end do
+      end if
+      words(n) = crc64(words(:n - 1))
 
    contains
 
@@ -74,7 +72,7 @@ contains
          end do
       end subroutine put
 
-   end subroutine append_record
+   end subroutine encode_record
 
    !> Read a record. Arrays of `kept` are allocated; those of a case that is not done are left as they are.
    subroutine decode_record(words, shape, kept)
@@ -140,52 +138,22 @@ contains
       end do
    end subroutine unpack
 
-   !> Make a shard of records that begin behind the header: fill header and trailer.
-   pure subroutine seal_words(words, used, n_records, fingerprint)
-      integer(i8), intent(inout) :: words(:) !! with room for the trailer
-      integer, intent(inout) :: used         !! with the header; out: the whole shard
-      integer, intent(in) :: n_records
-      integer(i8), intent(in) :: fingerprint
-      words(1) = magic
-      words(2) = fingerprint
-      words(3) = n_records
-      words(4) = used + trailer_words
-      words(used + 1) = crc64(words(:used))
-      used = used + trailer_words
-   end subroutine seal_words
+   !> Are these words as they were written? Every bit of them counts.
+   pure logical function is_sound(words)
+      integer(i8), intent(in) :: words(:) !! as long as their first says
+      is_sound = crc64(words(:size(words) - 1)) == words(size(words))
+   end function is_sound
 
-   !> Why these words are no whole shard of this sweep; empty if they are. Every bit of the file counts.
-   pure function check_shard(words, fingerprint, shape, n_cases) result(fault)
+   !> May this sound record be a result of the sweep?
+   pure logical function fits_sweep(words, shape, n_cases)
       integer(i8), intent(in) :: words(:)
-      integer(i8), intent(in) :: fingerprint
       type(case_shape), intent(in) :: shape
       integer, intent(in) :: n_cases
-      character(len=:), allocatable :: fault
-      integer(i8) :: at, length, n
-      integer :: last
 
-      fault = 'truncated'
-      last = size(words)
-      if (last < header_words + trailer_words) return
-      if (words(4) /= last) then
-         if (crc64(words(:last - 1)) == words(last)) fault = 'wrong length'
-         return
-      end if
-      fault = 'checksum wrong'
-      if (words(1) /= magic .or. crc64(words(:last - 1)) /= words(last)) return
-      fault = 'belongs to another sweep'
-      if (words(2) /= fingerprint) return
-      fault = 'records do not fit the sweep'
-      at = header_words + 1
-      do n = 1, words(3)
-         if (at + fixed_words > last) return
-         length = words(at)
-         if (words(at + at_case) < 1 .or. words(at + at_case) > n_cases) return
-         if (words(at + at_status) /= status_done .and. words(at + at_status) /= status_failed) return
-         if (length /= record_words(shape, int(words(at + at_status)), int(words(at + message_at)))) return
-         at = at + length
-      end do
-      if (at == last) fault = ''
-   end function check_shard
+      associate (case => words(1 + at_case), status => words(1 + at_status))
+         fits_sweep = case >= 1 .and. case <= n_cases .and. (status == status_done .or. status == status_failed)
+         if (fits_sweep) fits_sweep = size(words) == record_words(shape, int(status), int(words(1 + message_at)))
+      end associate
+   end function fits_sweep
 
 end module rodyn_sweep_record

@@ -1,193 +1,122 @@
-!> Results onto the disk: finished cases are collected for a moment, then sealed as a shard.
+!> A shard: a file of records that can be trusted word by word, whether it was sealed or its writer was killed.
 !>
-!>     call writer%open(directory, tag, first_number, fingerprint, shape)
-!>     call writer%add(kept, error)       ! seals by itself, several times a second at first
-!>     call writer%seal(error)            ! whatever waits
-!>
-!> A shard is written under a temporary name, synced, renamed, and its name synced; then the journal says so. Many small
-!> shards of one process are combined into one, and many of these again, so that their number stays small.
+!> Header: magic; fingerprint of the plan; CRC-64 of these. Then records (`rodyn_sweep_record`), each appended when its
+!> case is finished. Trailer: 0; number of records; CRC-64 of the CRCs of header and records, in their order.
+!> Without a trailer the shard is open: somebody writes it, or did when he was killed. Its good records count all the same.
 module rodyn_sweep_shard
-   use rodyn_kinds, only: wp, i8
-   use rodyn_errors, only: error_type, raise
-   use rodyn_posix, only: remove_file
-   use rodyn_posix_files, only: read_words, write_words
-   use rodyn_sweep_case, only: case_result, case_shape
-   use rodyn_sweep_journal, only: write_journal
-   use rodyn_sweep_record, only: append_record, check_shard, header_words, record_words, seal_words
+   use rodyn_kinds, only: i8
+   use rodyn_checksum, only: crc64
+   use rodyn_sweep_case, only: case_shape
+   use rodyn_sweep_record, only: fits_sweep, is_sound, shortest_record
    implicit none (type, external)
    private
-   public :: shard_writer
+   public :: shard_extent, shard_header, shard_trailer, sift_shard
+   public :: header_words
 
-   ! How long a result may wait: a kill in this time costs it. Short at first, and in long sweeps 5 % of the time so far
-   ! up to 2 s, so that a thousand processes do not make thousands of files each second. Longer cases never wait.
-   real(wp), parameter :: shortest_wait = 0.25_wp, longest_wait = 2.0_wp, share_of_time = 0.05_wp ! [s], [s], 1
-   integer, parameter :: most_words = 512*1024            !! words that wait: 4 MiB
-   integer, parameter :: combine_at = 32                  !! shards of one level that become one of the next
-   integer, parameter :: n_levels = 4
-   integer, parameter :: largest_combined = 16*1024*1024  !! words: 128 MiB
-   integer, parameter :: name_length = 64
+   integer(i8), parameter :: magic = 3623237496189767506_i8 !! 'RODYNSH2'
+   integer(i8), parameter :: end_mark = 0 !! in place of the length of a record
+   integer, parameter :: header_words = 3, trailer_words = 3
 
-   type :: shard_writer
-      character(len=:), allocatable :: directory      !! of the sweep
-      character(len=:), allocatable :: tag            !! of this process among all of the sweep
-      integer :: next_number = 1
-      integer(i8) :: fingerprint = 0
-      integer :: n_cases = 0
-      type(case_shape) :: shape
-      integer(i8), allocatable :: words(:)
-      integer :: used = header_words
-      integer :: n_waiting = 0                        !! results in `words`
-      integer(i8) :: clock_first = 0                  !! when the first of them came
-      integer(i8) :: clock_start = 0
-      character(len=name_length) :: names(combine_at, n_levels) !! shards that may be combined
-      integer :: n_names(n_levels) = 0
-      integer(i8) :: n_words(n_levels) = 0            !! in them
+   !> What a shard holds so far.
+   type :: shard_extent
+      integer :: used = 0        !! words: header and records
+      integer :: n_records = 0
+      integer(i8) :: total = 0   !! checksum of their checksums
+      logical :: sealed = .false. !! a trailer follows
    contains
-      procedure :: open => open_writer
       procedure :: add
-      procedure :: seal
-      procedure, private :: write_shard
-      procedure, private :: note
-      procedure, private :: combine
-   end type shard_writer
+   end type shard_extent
 
 contains
 
-   subroutine open_writer(self, directory, tag, first_number, fingerprint, shape, n_cases)
-      class(shard_writer), intent(out) :: self
-      character(len=*), intent(in) :: directory, tag
-      integer, intent(in) :: first_number !! no shard of this tag has it or a greater one
+   pure function shard_header(fingerprint) result(words)
+      integer(i8), intent(in) :: fingerprint
+      integer(i8) :: words(header_words)
+      words = [magic, fingerprint, crc64([magic, fingerprint])]
+   end function shard_header
+
+   pure function shard_trailer(extent) result(words)
+      type(shard_extent), intent(in) :: extent
+      integer(i8) :: words(trailer_words)
+      words = [end_mark, int(extent%n_records, i8), extent%total]
+   end function shard_trailer
+
+   !> Note the header, or the next record.
+   pure subroutine add(self, words)
+      class(shard_extent), intent(inout) :: self
+      integer(i8), intent(in) :: words(:)
+      if (self%used > 0) self%n_records = self%n_records + 1
+      self%used = self%used + size(words)
+      self%total = crc64(words(size(words):), self%total)
+   end subroutine add
+
+   !> Tell the good records of a shard from the bad. On return `words(:extent%used)` is a header with the good ones. Where
+   !> all is well nothing has moved, and `fault` is empty.
+   pure subroutine sift_shard(words, fingerprint, shape, n_cases, extent, fault)
+      integer(i8), intent(inout) :: words(:)
       integer(i8), intent(in) :: fingerprint
       type(case_shape), intent(in) :: shape
       integer, intent(in) :: n_cases
-      self%directory = directory
-      self%tag = tag
-      self%next_number = first_number
-      self%fingerprint = fingerprint
-      self%shape = shape
-      self%n_cases = n_cases
-      call system_clock(self%clock_start)
-      allocate (self%words(4096))
-   end subroutine open_writer
+      type(shard_extent), intent(out) :: extent
+      character(len=:), allocatable, intent(out) :: fault
+      integer :: at, length, used
 
-   !> Take a result. On return it may be on the disk or wait; `seal` ends the waiting.
-   subroutine add(self, kept, error)
-      class(shard_writer), intent(inout) :: self
-      type(case_result), intent(in) :: kept
-      type(error_type), allocatable, intent(out) :: error
-      integer(i8), allocatable :: larger(:)
-      integer(i8) :: now, rate
-      integer :: needed
-      real(wp) :: wait
-
-      call system_clock(now, rate)
-      wait = max(shortest_wait, min(longest_wait, share_of_time*real(now - self%clock_start, wp)/real(rate, wp)))
-      if (self%n_waiting == 0) self%clock_first = now
-      needed = self%used + record_words(self%shape, kept%status, len(kept%message)) + 1
-      if (needed > size(self%words)) then
-         allocate (larger(max(needed, 2*size(self%words))))
-         larger(:self%used) = self%words(:self%used)
-         call move_alloc(larger, self%words)
-      end if
-      call append_record(kept, self%shape, self%words, self%used)
-      self%n_waiting = self%n_waiting + 1
-      if (self%used < most_words .and. real(now - self%clock_first, wp) < wait*real(rate, wp) &
-          .and. kept%wall_seconds < wait) return
-      call self%seal(error)
-   end subroutine add
-
-   !> Put all that waits onto the disk. After a failure it still waits.
-   subroutine seal(self, error)
-      class(shard_writer), intent(inout) :: self
-      type(error_type), allocatable, intent(out) :: error
-      character(len=name_length) :: name
-
-      if (self%n_waiting == 0) return
-      call self%write_shard(self%words, self%used, self%n_waiting, name, error)
-      if (allocated(error)) return
-      self%n_waiting = 0
-      call self%note(1, name, self%used, error)
-      self%used = header_words
-   end subroutine seal
-
-   !> A new shard of a level; when there are many, they become one of the next.
-   recursive subroutine note(self, level, name, n_words, error)
-      class(shard_writer), intent(inout) :: self
-      integer, intent(in) :: level
-      character(len=name_length), intent(in) :: name
-      integer, intent(in) :: n_words
-      type(error_type), allocatable, intent(out) :: error
-
-      if (level > n_levels) return
-      self%n_names(level) = self%n_names(level) + 1
-      self%n_words(level) = self%n_words(level) + n_words
-      self%names(self%n_names(level), level) = name
-      if (self%n_words(level) > largest_combined) then
-         self%n_names(level) = 0
-         self%n_words(level) = 0
-      else if (self%n_names(level) == combine_at) then
-         call self%combine(level, error)
-      end if
-   end subroutine note
-
-   !> A shard of `n_records` records behind the header of `words`.
-   subroutine write_shard(self, words, used, n_records, name, error)
-      class(shard_writer), intent(inout) :: self
-      integer(i8), contiguous, intent(inout) :: words(:)
-      integer, intent(in) :: used
-      integer, intent(in) :: n_records
-      character(len=name_length), intent(out) :: name
-      type(error_type), allocatable, intent(out) :: error
-      character(len=:), allocatable :: failure
-      integer :: total
-
-      total = used
-      write (name, '(a, "-", i6.6, ".shard")') self%tag, self%next_number
-      call seal_words(words, total, n_records, self%fingerprint)
-      failure = write_words(self%directory//'/shards/'//trim(name), words(:total))
-      if (len(failure) > 0) then
-         call raise(error, self%directory//'/shards/'//trim(name)//': results cannot be put onto the disk: '//failure// &
-                    '; all before them are safe, run again to resume')
-         return
-      end if
-      self%next_number = self%next_number + 1
-      call write_journal(self%directory, self%tag, 'sealed', trim(name), n_records, words(total), error)
-   end subroutine write_shard
-
-   !> Make one shard of those of a level. They are removed only when it is on the disk; if anything is wrong with one
-   !> of them, all stay as they are.
-   recursive subroutine combine(self, level, error)
-      class(shard_writer), intent(inout) :: self
-      integer, intent(in) :: level
-      type(error_type), allocatable, intent(out) :: error
-      integer(i8), allocatable :: words(:), part(:)
-      character(len=name_length) :: name
-      character(len=:), allocatable :: failure
-      integer :: i, n, n_records, used
-
-      allocate (words(self%n_words(level) + 1))
-      used = header_words
-      n_records = 0
-      n = self%n_names(level)
-      self%n_names(level) = 0
-      self%n_words(level) = 0
-      do i = 1, n
-         call read_words(self%directory//'/shards/'//trim(self%names(i, level)), part)
-         if (len(check_shard(part, self%fingerprint, self%shape, self%n_cases)) > 0) return
-         n_records = n_records + int(part(3))
-         associate (length => size(part) - header_words - 1)
-            words(used + 1:used + length) = part(header_words + 1:header_words + length)
-            used = used + length
-         end associate
+      call check_header(words, fingerprint, fault)
+      if (len(fault) > 0) return
+      call extent%add(words(:header_words))
+      at = header_words + 1
+      do while (at <= size(words))
+         length = record_at(words(at:), shape, n_cases)
+         if (length > 0) then
+            used = extent%used
+            if (at > used + 1) words(used + 1:used + length) = words(at:at + length - 1)
+            call extent%add(words(used + 1:used + length))
+            at = at + length
+         else if (len(fault) == 0 .and. is_trailer(words(at:), extent)) then
+            extent%sealed = .true.
+            return
+         else ! look for the next good record: there is hardly a word that could be its first but is not
+            fault = 'checksum wrong'
+            at = at + 1
+         end if
       end do
-      call self%write_shard(words, used, n_records, name, error)
-      if (allocated(error)) return
-      do i = 1, n
-         call write_journal(self%directory, self%tag, 'combined', trim(self%names(i, level)), 0, 0_i8, error)
-         if (allocated(error)) return
-         failure = remove_file(self%directory//'/shards/'//trim(self%names(i, level)))
-      end do
-      call self%note(level + 1, name, used, error)
-   end subroutine combine
+   end subroutine sift_shard
+
+   !> Length of the good record that begins here; 0: none does.
+   pure integer function record_at(words, shape, n_cases) result(length)
+      integer(i8), intent(in) :: words(:)
+      type(case_shape), intent(in) :: shape
+      integer, intent(in) :: n_cases
+
+      length = 0
+      if (words(1) < shortest_record .or. words(1) > size(words)) return
+      associate (record => words(:int(words(1))))
+         if (.not. is_sound(record)) return
+         if (fits_sweep(record, shape, n_cases)) length = size(record)
+      end associate
+   end function record_at
+
+   pure logical function is_trailer(words, extent)
+      integer(i8), intent(in) :: words(:)
+      type(shard_extent), intent(in) :: extent
+      is_trailer = size(words) == trailer_words
+      if (is_trailer) is_trailer = all(words == shard_trailer(extent))
+   end function is_trailer
+
+   !> Without a good header nothing that follows can be trusted.
+   pure subroutine check_header(words, fingerprint, fault)
+      integer(i8), intent(in) :: words(:)
+      integer(i8), intent(in) :: fingerprint
+      character(len=:), allocatable, intent(out) :: fault
+
+      fault = ''
+      if (size(words) < header_words) then
+         fault = 'truncated'
+      else if (words(1) /= magic .or. words(3) /= crc64(words(:2))) then
+         fault = 'header wrong'
+      else if (words(2) /= fingerprint) then
+         fault = 'belongs to another sweep'
+      end if
+   end subroutine check_header
 
 end module rodyn_sweep_shard

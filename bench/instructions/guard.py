@@ -1,0 +1,98 @@
+"""Count the instructions of right-hand sides and short runs, and compare them with the recorded ones.
+
+    python bench/instructions/guard.py            exit 1 if anything takes over 5 % more than recorded
+    python bench/instructions/guard.py --record   write the counts of this compiler into counts.json
+
+Instructions do not depend on what else the machine does, so a slow-down of 5 % shows in review where time would not.
+They are counted by valgrind's callgrind (Debian: package valgrind), which knows no AVX-512: the program is built for
+x86-64-v3. Counts belong to a compiler version; one that is not in counts.json is only reported, with exit 3.
+"""
+
+import argparse
+import json
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+COUNTS = pathlib.Path(__file__).with_name("counts.json")
+TOLERANCE = 1.05
+KINDS = {  # kind: two numbers of calls whose difference is counted
+    "rhs": (1000, 3000),
+    "rhs_rigid": (1000, 3000),
+    "rhs_lumped": (1000, 3000),
+    "lanes": (1000, 3000),
+    "run_dop853": (1, 3),
+    "run_gauss": (1, 3),
+    "run_adams": (1, 3),
+    "run_bdf": (1, 3),
+}
+
+
+def command_output(*command: str, **environment: str) -> str:
+    """Standard output and error of a command in the project's directory."""
+    done = subprocess.run(
+        command, cwd=ROOT, env=os.environ | environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+    )
+    if done.returncode:
+        sys.exit(f"{' '.join(command)}\n{done.stdout}")
+    return done.stdout
+
+
+def build(prefix: str) -> str:
+    """Build the benchmark for x86-64-v3; return its path."""
+    compiler = os.environ.get("FPM_FC", "mpifort")
+    path = f"{ROOT / '.venv' / 'bin'}:{os.environ['PATH']}"
+    flags = command_output("tools/flags", "release", RODYN_MARCH="x86-64-v3").strip()
+    command_output("fpm", "build", "--flag", flags, FPM_FC=compiler, PATH=path)
+    runner = f"cp -t {prefix}"
+    command_output("fpm", "run", "--example", "bench_instructions", "--flag", flags, "--runner", runner, FPM_FC=compiler, PATH=path)
+    return str(pathlib.Path(prefix) / "bench_instructions")
+
+
+def instructions(program: str, kind: str, times: int) -> int:
+    """Instructions of a whole process."""
+    text = command_output(
+        "valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null", program, kind, str(times), OPENBLAS_NUM_THREADS="1"
+    )
+    return int(re.search(r"Collected : (\d+)", text)[1])
+
+
+def count(program: str, kind: str) -> float:
+    """Instructions of one call or run."""
+    few, many = KINDS[kind]
+    return (instructions(program, kind, many) - instructions(program, kind, few)) / (many - few)
+
+
+def main() -> int:
+    """Count, compare or record."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--record", action="store_true", help="write counts.json instead of comparing")
+    record = parser.parse_args().record
+    compiler = command_output("gfortran", "-dumpfullversion").strip()
+    recorded = json.loads(COUNTS.read_text()) if COUNTS.exists() else {}
+    known = recorded.get(f"gfortran {compiler}", {})
+    with tempfile.TemporaryDirectory() as prefix:
+        program = build(prefix)
+        counts = {kind: round(count(program, kind)) for kind in KINDS}
+    slower = []
+    for kind, found in counts.items():
+        change = f"{100 * (found / known[kind] - 1):+.1f} %" if kind in known else "not recorded"
+        print(f"{kind:12} {found:10d} instructions  {change}")
+        if kind in known and found > TOLERANCE * known[kind]:
+            slower.append(kind)
+    if record:
+        recorded[f"gfortran {compiler}"] = counts
+        COUNTS.write_text(json.dumps(recorded, indent=1) + "\n")
+        return 0
+    if slower:
+        print(f"more than 5 % above counts.json: {', '.join(slower)}")
+        return 1
+    return 0 if all(kind in known for kind in KINDS) else 3
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,110 @@
+!> The fast end of a scene's spectrum in O(n): its highest natural frequency and fastest decay, by power iteration with
+!> the right-hand side. Good to a tenth, which is what a choice of method needs; `rodyn_frequencies` has all of them.
+module rodyn_fastest_rates
+   use rodyn_kinds, only: wp
+   use rodyn_errors, only: error_type
+   use rodyn_scene, only: scene_type
+   use rodyn_rod_integrals, only: rod_integrals
+   use rodyn_accelerations, only: dynamics_type, new_dynamics
+   implicit none (type, external)
+   private
+   public :: fastest_rates, with_rigid_rods
+
+   integer, parameter :: n_iterations = 40
+   real(wp), parameter :: step = 1.0e-5_wp !! change of the coordinates for derivatives [rad]
+
+contains
+
+   !> About a configuration, at rest and without loads. Zero where there is neither spring nor damper.
+   subroutine fastest_rates(scene, q, frequency, decay)
+      type(scene_type), intent(in) :: scene
+      real(wp), intent(in) :: q(:)           !! coordinates (n_q)
+      real(wp), intent(out) :: frequency     !! highest natural frequency [rad/s]
+      real(wp), intent(out) :: decay         !! fastest decay if nothing but the dampers acted [1/s]
+      type(dynamics_type) :: dynamics
+      type(error_type), allocatable :: error
+      real(wp) :: x(scene%n_dof), image(scene%n_dof), growth(2)
+      integer :: which, i, k
+      logical :: ok
+
+      frequency = 0.0_wp
+      decay = 0.0_wp
+      growth = 0.0_wp
+      call new_dynamics(dynamics, scene, error)
+      if (allocated(error)) return
+      do which = 1, merge(2, 1, scene%hinges%has_damping)
+         x = [(cos(2.4_wp*real(k, wp)**2), k=1, scene%n_dof)] ! something of everything
+         if (scene%n_base > 0) x(1:3) = 0.0_wp
+         do i = 1, n_iterations
+            x = x/norm2(x)
+            if (which == 1) then
+               call by_springs(dynamics, q, x, image, ok)
+            else
+               call by_dampers(dynamics, q, x, image, ok)
+            end if
+            if (.not. ok) return
+            growth(which) = norm2(image)
+            if (.not. growth(which) > tiny(1.0_wp)) exit
+            x = image
+         end do
+      end do
+      frequency = sqrt(growth(1))
+      decay = max(growth(2), scene%hinges%fastest_relaxation())
+   end subroutine fastest_rates
+
+   !> The scene without the bending of its rods: what is left of its spectrum are the slow motions of the chain. Scenes
+   !> whose rods do not bend as motion are returned as they are.
+   function with_rigid_rods(scene) result(rigid)
+      type(scene_type), intent(in) :: scene
+      type(scene_type) :: rigid
+      integer :: j
+
+      rigid = scene
+      if (.not. scene%dynamic_bending) return
+      rigid%dynamic_bending = .false.
+      rigid%n_dof = scene%n_base + scene%n
+      rigid%n_q = rigid%n_dof
+      do j = 1, size(rigid%rods)
+         associate (rod => rigid%rods(j), i => scene%rods(j)%inertia)
+            rod%inertia = rod_integrals(m0=i%m0, m1=i%m1, m2=i%m2)
+            rod%central = i%m0*i%m2 - i%m1**2
+            rod%outer = i%m2 - 2.0_wp*rod%length*i%m1 + rod%length**2*i%m0
+         end associate
+      end do
+   end function with_rigid_rods
+
+   !> M^-1 K x, by central differences.
+   subroutine by_springs(dynamics, q, x, image, ok)
+      type(dynamics_type), intent(inout) :: dynamics
+      real(wp), intent(in) :: q(:), x(:)
+      real(wp), intent(out) :: image(:)
+      logical, intent(out) :: ok
+      real(wp) :: moved(size(q)), rest(size(x)), plus(size(x)), minus(size(x))
+      logical :: ok_plus
+
+      rest = 0.0_wp
+      moved = q
+      moved(:size(x)) = q(:size(x)) + step*x
+      call dynamics%accelerations(0.0_wp, moved, rest, plus, ok_plus)
+      moved(:size(x)) = q(:size(x)) - step*x
+      call dynamics%accelerations(0.0_wp, moved, rest, minus, ok)
+      image = (minus - plus)/(2.0_wp*step)
+      ok = ok .and. ok_plus
+   end subroutine by_springs
+
+   !> M^-1 D x: the part of the accelerations that is odd in the rates.
+   subroutine by_dampers(dynamics, q, x, image, ok)
+      type(dynamics_type), intent(inout) :: dynamics
+      real(wp), intent(in) :: q(:), x(:)
+      real(wp), intent(out) :: image(:)
+      logical, intent(out) :: ok
+      real(wp) :: plus(size(x)), minus(size(x))
+      logical :: ok_plus
+
+      call dynamics%accelerations(0.0_wp, q, x, plus, ok_plus)
+      call dynamics%accelerations(0.0_wp, q, -x, minus, ok)
+      image = 0.5_wp*(minus - plus)
+      ok = ok .and. ok_plus
+   end subroutine by_dampers
+
+end module rodyn_fastest_rates

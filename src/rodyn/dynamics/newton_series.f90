@@ -1,0 +1,236 @@
+!> Newton systems of massless rods in series with hinges (`rodyn_hinge_law`), in O(n).
+!>
+!> With `reduced` dampers T = C G z + G^T D G z', G = (1 + F C)^-1, z the openings, ties all hinges of the chain to each
+!> other; relaxing hinges are springs C + D/g to a Newton system, and no dampers. This becomes local with two sets of
+!> slopes: those that the springs' moments m alone bend, and those that the whole moments T bend. With f = l/(6 EI), s the
+!> opening of a hinge under springs alone (all angles in units of g^2),
+!>     s_{k-1} = phi - f (2 m_{k-1} + m_k) - tau_x,      m = C s,                         tau_x' = phi + f (m_{k-1} + 2 m_k),
+!>     T_{k-1} = g^2 C (phi - f/g^2 (2 T_{k-1} + T_k) - tau_s) + g D s_{k-1},       tau_s' = phi + f/g^2 (T_{k-1} + 2 T_k).
+!> The chain beyond hinge k - 1 is seen as in `rodyn_newton_chain`, with two rotations and two moments:
+!>     (fe, fn, -T, -m) = P (dAe, dAn, tau_s, tau_x) + P_w w' + b.
+!> The moments are unknowns themselves, not differences of stiff springs' ends, so no stiffness costs digits.
+module rodyn_newton_series
+   use rodyn_kinds, only: wp
+   use rodyn_rod_constants, only: rod_constants
+   use rodyn_newton_tangent, only: rod_tangent
+   implicit none (type, external)
+   private
+   public :: series_factor, factorise_series, reduce_series, expand_series
+
+   !> What elimination of a rod leaves. Its unknowns: phi, s_{k-1}, T_{k-1}, T_k, m_k.
+   type :: series_factor
+      real(wp) :: outer(4, 2)   !! P beyond the outer node, mass there included, columns dAe, dAn
+      real(wp) :: ae_w, ae_phi, an_phi !! as in `rod_factor`
+      real(wp) :: inverse(5, 5) !! of the rod's own block
+      real(wp) :: by_inner(5, 5) !! unknowns = y - by_inner (dAe, dAn, tau_s, tau_x, w')
+      real(wp) :: force(2, 5)   !! fe, fn by the unknowns
+      real(wp) :: stiffness     !! C of hinge k - 1
+      real(wp) :: slope, bend   !! f, f/g^2
+   end type series_factor
+
+contains
+
+   !> Eliminate all rods.
+   pure subroutine factorise_series(n, gamma, rods, rod_of, node_mass, stiffness, damping, tangent, factor, apparent, &
+                                    by_omega, ok)
+      integer, intent(in) :: n
+      real(wp), intent(in) :: gamma
+      type(rod_constants), intent(in) :: rods(:)
+      integer, intent(in) :: rod_of(n)
+      real(wp), intent(in) :: node_mass(0:n)
+      real(wp), intent(in) :: stiffness(0:n - 1), damping(0:n - 1) !! C, D of the law above
+      type(rod_tangent), intent(in) :: tangent(n)
+      type(series_factor), intent(inout) :: factor(n)
+      real(wp), intent(out) :: apparent(3, 2)      !! P at hinge 0, moving axes, columns dAx, dAy, rows of force and moment
+      real(wp), intent(out) :: by_omega(3)         !! P_w there
+      logical, intent(out) :: ok                   !! false: singular
+      real(wp) :: p(4, 5), own(5, 5), inner(5, 5)
+      integer :: k
+
+      p = 0.0_wp
+      ok = .true.
+      do k = n, 1, -1
+         associate (rod => rods(rod_of(k)), t => tangent(k), f => factor(k))
+            p(1, 1) = p(1, 1) + node_mass(k)
+            p(2, 2) = p(2, 2) + node_mass(k)
+            f%outer = p(:, 1:2)
+            f%ae_w = -2.0_wp*gamma*rod%length*t%w
+            f%ae_phi = f%ae_w - gamma**2*rod%length*t%wr
+            f%an_phi = rod%length*(1.0_wp - (gamma*t%w)**2)
+            f%stiffness = stiffness(k - 1)
+            call rod_equations(rod, t, gamma, gamma*damping(k - 1), p, f, inner, own)
+            call invert(own, f%inverse, ok)
+            if (.not. ok) return
+            f%by_inner = matmul(f%inverse, inner)
+            p(1:2, 3:4) = 0.0_wp
+            p(1:2, :) = p(1:2, :) - matmul(f%force, f%by_inner)
+            p(3, :) = f%by_inner(3, :)
+            p(4, :) = f%stiffness*f%by_inner(2, :)
+            call turn_axes(t%cd, t%sd, p)
+         end associate
+      end do
+      apparent = p(1:3, 1:2)
+      by_omega = p(1:3, 5)
+   end subroutine factorise_series
+
+   !> Equations of phi, s, T, T_k, m_k: by these unknowns (own) and by the motion of the inner end (inner). The last two
+   !> say what the chain beyond answers.
+   pure subroutine rod_equations(rod, t, gamma, damper, p, f, inner, own)
+      type(rod_constants), intent(in) :: rod
+      type(rod_tangent), intent(in) :: t
+      real(wp), intent(in) :: gamma, damper  !! g, g D
+      real(wp), intent(inout) :: p(4, 5)     !! in: of the chain beyond; out: its column of w' with the rod turning along
+      type(series_factor), intent(inout) :: f
+      real(wp), intent(out) :: inner(5, 5)   !! columns dAe, dAn, tau_s, tau_x, w'
+      real(wp), intent(out) :: own(5, 5)
+      real(wp) :: answer(4, 5), spring
+      integer :: j
+
+      f%slope = 1.0_wp/(3.0_wp*rod%kappa)
+      f%bend = f%slope/gamma**2
+      spring = gamma**2*f%stiffness
+      answer(:, 1) = p(:, 1)*f%ae_phi + p(:, 2)*f%an_phi + p(:, 3) + p(:, 4)
+      answer(:, 2) = p(:, 4)*f%slope*f%stiffness
+      answer(:, 3) = p(:, 3)*f%bend
+      answer(:, 4) = p(:, 3)*2.0_wp*f%bend
+      answer(:, 5) = p(:, 4)*2.0_wp*f%slope
+      p(:, 5) = p(:, 5) + p(:, 1)*f%ae_w + p(:, 2)*rod%length
+      f%force = answer(1:2, :)
+
+      own(1, :) = rod%length*answer(2, :)
+      own(1, 1) = own(1, 1) + gamma**2*t%phi_phi
+      own(1, 3) = own(1, 3) + 1.0_wp
+      own(1, 4) = own(1, 4) - 1.0_wp
+      own(2, :) = [-1.0_wp, 1.0_wp + 2.0_wp*f%slope*f%stiffness, 0.0_wp, 0.0_wp, f%slope]
+      own(3, :) = [-spring, -damper, 1.0_wp + 2.0_wp*f%slope*f%stiffness, f%slope*f%stiffness, 0.0_wp]
+      own(4, :) = answer(3, :)
+      own(4, 4) = own(4, 4) + 1.0_wp
+      own(5, :) = answer(4, :)
+      own(5, 5) = own(5, 5) + 1.0_wp
+
+      inner = 0.0_wp
+      do j = 1, 5
+         if (j == 3 .or. j == 4) cycle
+         inner(1, j) = rod%length*p(2, j)
+         inner(4, j) = p(3, j)
+         inner(5, j) = p(4, j)
+      end do
+      inner(2, 4) = 1.0_wp
+      inner(3, 3) = spring
+   end subroutine rod_equations
+
+   !> From the axes of rod k to those of rod k - 1.
+   pure subroutine turn_axes(cd, sd, p)
+      real(wp), intent(in) :: cd, sd
+      real(wp), intent(inout) :: p(4, 5)
+      real(wp) :: turned(4)
+
+      turned = cd*p(:, 1) - sd*p(:, 2)
+      p(:, 2) = sd*p(:, 1) + cd*p(:, 2)
+      p(:, 1) = turned
+      call turn_rows(p)
+
+   contains
+
+      pure subroutine turn_rows(x)
+         real(wp), intent(inout) :: x(4, 5)
+         real(wp) :: row(5)
+         row = cd*x(1, :) - sd*x(2, :)
+         x(2, :) = sd*x(1, :) + cd*x(2, :)
+         x(1, :) = row
+      end subroutine turn_rows
+
+   end subroutine turn_axes
+
+   !> Inverse by Gauss and Jordan with exchange of rows.
+   pure subroutine invert(a, b, ok)
+      real(wp), intent(inout) :: a(5, 5)
+      real(wp), intent(out) :: b(5, 5)
+      logical, intent(out) :: ok
+      real(wp) :: row(5), factor
+      integer :: i, j, best
+
+      b = 0.0_wp
+      do i = 1, 5
+         b(i, i) = 1.0_wp
+      end do
+      do j = 1, 5
+         best = j - 1 + maxloc(abs(a(j:, j)), dim=1)
+         ok = abs(a(best, j)) > 0.0_wp .and. abs(a(best, j)) <= huge(1.0_wp)
+         if (.not. ok) return
+         if (best /= j) then
+            row = a(j, :)
+            a(j, :) = a(best, :)
+            a(best, :) = row
+            row = b(j, :)
+            b(j, :) = b(best, :)
+            b(best, :) = row
+         end if
+         factor = 1.0_wp/a(j, j)
+         a(j, :) = a(j, :)*factor
+         b(j, :) = b(j, :)*factor
+         do i = 1, 5
+            if (i == j) cycle
+            factor = a(i, j)
+            a(i, :) = a(i, :) - factor*a(j, :)
+            b(i, :) = b(i, :) - factor*b(j, :)
+         end do
+      end do
+   end subroutine invert
+
+   !> Inward pass of a solution; see `reduce_chain`.
+   pure subroutine reduce_series(n, rods, rod_of, tangent, factor, d_omega, phi, phi_rate, moment, left, known)
+      integer, intent(in) :: n
+      type(rod_constants), intent(in) :: rods(:)
+      integer, intent(in) :: rod_of(n)
+      type(rod_tangent), intent(in) :: tangent(n)
+      type(series_factor), intent(in) :: factor(n)
+      real(wp), intent(in) :: d_omega, phi(n), phi_rate(n)
+      real(wp), intent(in) :: moment(0:n)  !! known parts of T
+      real(wp), intent(out) :: left(5, n)  !! unknowns of a rod whose inner end is at rest
+      real(wp), intent(out) :: known(3)    !! b at hinge 0, moving axes, known part of T_0 not included
+      real(wp) :: b(4), rows(5), along, across
+      integer :: k
+
+      b = 0.0_wp
+      do k = n, 1, -1
+         associate (t => tangent(k), f => factor(k), length => rods(rod_of(k))%length)
+            along = -length*(2.0_wp*t%w*(d_omega + phi_rate(k)) + t%wr*phi(k))
+            across = -length*t%w**2*phi(k)
+            b = b + f%outer(:, 1)*along + f%outer(:, 2)*across
+            rows = [length*b(2) + t%phi_phi*phi(k) - (moment(k) - moment(k - 1)), 0.0_wp, 0.0_wp, b(3), b(4)]
+            left(:, k) = -matmul(f%inverse, rows)
+            b(1:2) = b(1:2) + matmul(f%force, left(:, k))
+            b = [t%cd*b(1) - t%sd*b(2), t%sd*b(1) + t%cd*b(2), -left(3, k), -f%stiffness*left(2, k)]
+         end associate
+      end do
+      known = b(1:3)
+   end subroutine reduce_series
+
+   !> Outward pass; see `expand_chain`. Row 1 of the answer is phi, row 2 the changes of openings of the hinges.
+   pure subroutine expand_series(n, rods, rod_of, tangent, factor, d_omega, phi, phi_rate, omega_rate, hinge_x, hinge_y, left)
+      integer, intent(in) :: n
+      type(rod_constants), intent(in) :: rods(:)
+      integer, intent(in) :: rod_of(n)
+      type(rod_tangent), intent(in) :: tangent(n)
+      type(series_factor), intent(in) :: factor(n)
+      real(wp), intent(in) :: d_omega, phi(n), phi_rate(n), omega_rate, hinge_x, hinge_y
+      real(wp), intent(inout) :: left(5, n)
+      real(wp) :: inner(5)
+      integer :: k
+
+      inner = [hinge_x, hinge_y, 0.0_wp, 0.0_wp, omega_rate]
+      do k = 1, n
+         associate (t => tangent(k), f => factor(k), length => rods(rod_of(k))%length)
+            inner(1:2) = [t%cd*inner(1) + t%sd*inner(2), t%cd*inner(2) - t%sd*inner(1)]
+            left(:, k) = left(:, k) - matmul(f%by_inner, inner)
+            inner(1) = inner(1) - length*(2.0_wp*t%w*(d_omega + phi_rate(k)) + t%wr*phi(k)) + f%ae_w*omega_rate + &
+                       f%ae_phi*left(1, k)
+            inner(2) = inner(2) - length*t%w**2*phi(k) + length*omega_rate + f%an_phi*left(1, k)
+            inner(3) = left(1, k) + f%bend*(left(3, k) + 2.0_wp*left(4, k))
+            inner(4) = left(1, k) + f%slope*(f%stiffness*left(2, k) + 2.0_wp*left(5, k))
+         end associate
+      end do
+   end subroutine expand_series
+
+end module rodyn_newton_series

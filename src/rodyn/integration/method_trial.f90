@@ -1,0 +1,188 @@
+!> What methods cost on a scene, found by trying: the beginning of a run by each, with equal and growing effort.
+!>
+!> Effort is counted, not timed, so that the same scene gets the same method everywhere. The unit is one right-hand side;
+!> what else a step costs was measured (docs/performance.md, `bench_newton`).
+module rodyn_method_trial
+   use rodyn_kinds, only: wp
+   use rodyn_errors, only: error_type
+   use rodyn_scene, only: scene_type
+   use rodyn_motion, only: motion_type, new_motion
+   use rodyn_integrator, only: integrator_type, solver_options, solver_statistics
+   use rodyn_integrators, only: new_integrator
+   implicit none (type, external)
+   private
+   public :: candidate_type, candidates, effort_of, try_methods
+
+   !> A method, with the highest order if it is not the usual one.
+   type :: candidate_type
+      character(len=6) :: method = ''
+      integer :: order = 0
+   end type candidate_type
+
+   !> Explicit; implicit; implicit and stable for every vibration, which BDF is up to order 2.
+   type(candidate_type), parameter :: candidates(3) = &
+      [candidate_type('dop853', 0), candidate_type('bdf', 0), candidate_type('bdf', 2)] ! the explicit one first
+
+   real(wp), parameter :: first_effort = 400.0_wp     !! of a candidate, doubled from round to round
+   real(wp), parameter :: explicit_effort = 3000.0_wp !! are enough to know the rather even pace of the explicit method
+   real(wp), parameter :: clear_lead = 4.0_wp         !! of an implicit method, with which the trial ends
+
+   !> A run that can be continued.
+   type :: runner
+      type(motion_type), pointer :: motion => null()
+      class(integrator_type), allocatable :: integrator
+      real(wp) :: effort = 0.0_wp  !! spent
+      real(wp) :: reached = 0.0_wp !! [s]
+      real(wp) :: pace = 0.0_wp    !! simulated time for an effort of 1 in the last round [s]
+      real(wp) :: growth(2) = 1.0_wp !! of the pace, in the last round and the one before
+      logical :: failed = .false.
+   end type runner
+
+contains
+
+   !> Effort of a run: that of one right-hand side is 1. Beside them, an implicit step solves as often, which takes as
+   !> long, has a new Jacobian or factors now and then, and adds vectors: 2, and what does not grow with n.
+   pure real(wp) function effort_of(method, n, stats)
+      character(len=*), intent(in) :: method
+      integer, intent(in) :: n !! rods
+      type(solver_statistics), intent(in) :: stats
+      effort_of = real(stats%n_rhs, wp)
+      if (method == 'bdf') effort_of = 2.2_wp*real(stats%n_rhs, wp) + 3.0_wp*real(stats%n_jac, wp) + &
+                                       real(stats%n_steps, wp)*(2.2_wp + 20.0_wp/(1.0_wp + 0.37_wp*n))
+   end function effort_of
+
+   !> Effort that each candidate would need from 0 to `t_end`, huge if it fails. An implicit method may creep at first,
+   !> until vibrations it does not follow have died out. So its pace is that of the last round; that of order 2, which no
+   !> vibration holds back, may go on growing.
+   subroutine try_methods(scene, y, options, t_first, t_end, share, forecast, effort)
+      type(scene_type), intent(in) :: scene
+      real(wp), intent(in) :: y(:)                  !! state at t = 0, without quadratures
+      type(solver_options), intent(in) :: options
+      real(wp), intent(in) :: t_first               !! end of the trial at the latest; no load switches before [s]
+      real(wp), intent(in) :: t_end                 !! [s]
+      real(wp), intent(in) :: share                 !! of the effort of the explicit method, for one candidate at most
+      real(wp), intent(out) :: forecast(size(candidates))
+      real(wp), intent(out) :: effort               !! spent on the trial
+      type(runner) :: runners(size(candidates))
+      real(wp) :: allowed, others(size(candidates))
+      integer :: i
+
+      do i = 1, size(candidates)
+         call start_runner(runners(i), candidates(i), scene, y, options, t_first)
+      end do
+      allowed = first_effort
+      do
+         do i = 1, size(candidates)
+            if (candidates(i)%method == 'dop853' .and. runners(i)%effort > max(explicit_effort, 0.25_wp*allowed)) cycle
+            if (hopeless(runners(i), candidates(i), runners(1)%pace)) cycle
+            call continue_runner(runners(i), candidates(i), scene%n, y, t_first, allowed)
+         end do
+         forecast = [(forecast_of(runners(i), t_end, candidates(i)%order == 2 .and. allowed > 3.0_wp*first_effort), &
+                      i=1, size(candidates))]
+         if (any(runners%reached >= t_first) .or. runners(1)%failed) exit
+         if (1.4_wp*allowed >= share*forecast(1)) exit ! a short round would tell nothing
+         i = minloc(forecast, dim=1)
+         others = forecast
+         others(i) = huge(1.0_wp)
+         if (i > 1 .and. allowed > 3.0_wp*first_effort .and. clear_lead*forecast(i) < minval(others)) exit
+         allowed = min(2.0_wp*allowed, share*forecast(1))
+      end do
+      effort = sum(runners%effort)
+      do i = 1, size(runners)
+         if (allocated(runners(i)%integrator)) call runners(i)%integrator%finalize()
+         if (associated(runners(i)%motion)) deallocate (runners(i)%motion)
+      end do
+   end subroutine try_methods
+
+   !> An implicit method that vibrations hold back goes on at its even pace.
+   pure logical function hopeless(self, candidate, explicit_pace)
+      type(runner), intent(in) :: self
+      type(candidate_type), intent(in) :: candidate
+      real(wp), intent(in) :: explicit_pace
+      hopeless = candidate%method == 'bdf' .and. candidate%order == 0 .and. self%effort > 2.0_wp*explicit_effort .and. &
+                 2.0_wp*self%pace < explicit_pace .and. self%growth(1) < 1.1_wp
+   end function hopeless
+
+   !> Effort to the end if the pace stays, or goes on growing as it did.
+   pure real(wp) function forecast_of(self, t_end, grows)
+      type(runner), intent(in) :: self
+      real(wp), intent(in) :: t_end
+      logical, intent(in) :: grows
+      real(wp), parameter :: most_growth = 2.0_wp
+      real(wp) :: reached, pace, growth
+
+      forecast_of = huge(1.0_wp)
+      if (self%failed .or. .not. self%pace > 0.0_wp) return
+      forecast_of = self%effort
+      reached = self%reached
+      growth = merge(max(1.0_wp, min(most_growth, minval(self%growth))), 1.0_wp, grows)
+      pace = self%pace
+      do while (reached < t_end)
+         pace = pace*growth
+         if (reached + forecast_of*pace >= t_end .or. growth < 1.2_wp) then
+            forecast_of = forecast_of + (t_end - reached)/pace
+            exit
+         end if
+         reached = reached + forecast_of*pace
+         forecast_of = 2.0_wp*forecast_of
+      end do
+   end function forecast_of
+
+   subroutine start_runner(self, candidate, scene, y, options, t_end)
+      type(runner), intent(inout) :: self
+      type(candidate_type), intent(in) :: candidate
+      type(scene_type), intent(in) :: scene
+      real(wp), intent(in) :: y(:)
+      type(solver_options), intent(in) :: options
+      real(wp), intent(in) :: t_end
+      type(solver_options) :: own
+      type(error_type), allocatable :: error
+
+      own = options
+      own%order = candidate%order
+      if (candidate%method == 'bdf') own%fixed_step = 0.0_wp
+      allocate (self%motion)
+      call new_motion(self%motion, scene, .false., error)
+      if (.not. allocated(error)) then
+         call self%motion%dynamics%set_regime(0.0_wp, t_end)
+         call new_integrator(self%integrator, self%motion, trim(candidate%method), own, error)
+      end if
+      if (.not. allocated(error)) then
+         call self%integrator%set_stop(t_end)
+         call self%integrator%start(0.0_wp, y, error)
+      end if
+      self%failed = allocated(error)
+   end subroutine start_runner
+
+   !> Go on until the effort is spent, or the end or a failure is met.
+   subroutine continue_runner(self, candidate, n, y, t_end, allowed)
+      type(runner), intent(inout) :: self
+      type(candidate_type), intent(in) :: candidate
+      integer, intent(in) :: n
+      real(wp), intent(in) :: y(:), t_end, allowed
+      integer, parameter :: n_slices = 4 ! a slice too long costs no more than a quarter of what is allowed
+      type(error_type), allocatable :: error
+      type(solver_statistics) :: stats
+      real(wp) :: state(size(y)), per_step, effort_before, reached_before, pace_before
+      integer :: steps
+
+      effort_before = self%effort
+      reached_before = self%reached
+      pace_before = self%pace
+      do while (.not. self%failed .and. self%reached < t_end .and. self%effort < 0.9_wp*allowed)
+         stats = self%integrator%statistics()
+         per_step = 14.0_wp
+         if (stats%n_steps > 0) per_step = self%effort/real(stats%n_steps, wp)
+         steps = max(5, int(min((allowed - self%effort)/per_step, allowed/(n_slices*per_step))))
+         self%integrator%options%max_steps = int(stats%n_steps) + steps
+         call self%integrator%advance(t_end, state, self%reached, error)
+         stats = self%integrator%statistics()
+         self%effort = effort_of(candidate%method, n, stats)
+         self%failed = allocated(error) .and. self%reached < t_end .and. stats%n_steps < self%integrator%options%max_steps
+      end do
+      if (.not. self%effort > effort_before) return
+      self%pace = (self%reached - reached_before)/(self%effort - effort_before)
+      if (pace_before > 0.0_wp) self%growth = [self%pace/pace_before, self%growth(1)]
+   end subroutine continue_runner
+
+end module rodyn_method_trial
