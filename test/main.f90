@@ -8,9 +8,11 @@ program tester
    use test_gauss, only: collect_gauss
    use test_beams, only: collect_beams
    use test_invariants, only: collect_invariants
+   use test_ensemble, only: collect_ensemble
    use test_hdf5_files, only: collect_hdf5_files
    use test_integrators, only: collect_integrators
    use test_kernels, only: collect_kernels
+   use test_lanes, only: collect_lanes
    use test_method_choice, only: collect_method_choice
    use test_motion, only: collect_motion
    use test_newton, only: collect_newton
@@ -40,10 +42,12 @@ program tester
 
    call run('quadrature', collect_quadrature)
    call run('kernels', collect_kernels)
+   call run('lanes', collect_lanes)
    call run('motion', collect_motion)
    call run('newton', collect_newton)
    call run('integrators', collect_integrators)
    call run('gauss', collect_gauss)
+   call run('ensemble', collect_ensemble)
    call run('method_choice', collect_method_choice)
    call run('progress', collect_progress)
    call run('namelist', collect_namelist)

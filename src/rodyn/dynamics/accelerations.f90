@@ -12,7 +12,7 @@ module rodyn_accelerations
    use rodyn_recursion_lumped, only: lumped_accelerations
    use rodyn_lanes, only: lanes
    use rodyn_lane_scene, only: lane_scene, new_lane_scene, suits_lanes
-   use rodyn_lane_recursion_flexible, only: lane_work, new_lane_work, lane_flexible_accelerations
+   use rodyn_lane_accelerations, only: lane_work, new_lane_work, group_accelerations
    use rodyn_assembled, only: assembled_system, new_assembled_system, assembled_accelerations
    implicit none (type, external)
    private
@@ -33,6 +33,7 @@ module rodyn_accelerations
       type(lane_scene), allocatable :: group !! the scene in every lane; allocated when first needed
       type(lane_work) :: group_work
       logical :: group_is_current = .false.  !! its forces are those of the regime
+      real(wp), allocatable, dimension(:) :: lane_q, lane_p, lane_rates !! of one lane (n_dof), where lanes have no kernel
    contains
       procedure :: set_regime
       procedure :: accelerations
@@ -116,25 +117,37 @@ contains
       real(wp), contiguous, intent(in) :: q(:, :), p(:, :)    !! (lanes, n_dof)
       real(wp), contiguous, intent(out) :: acceleration(:, :) !! p' (lanes, n_dof)
       logical, intent(out) :: ok                              !! false: not in every lane
-      real(wp) :: one(self%scene%n_dof)
       logical :: lane_ok(lanes)
-      integer :: i
 
       if (.not. suits_lanes(self%scene)) then
-         do i = 1, lanes
-            call self%accelerations(t(i), q(i, :), p(i, :), one, ok)
-            if (.not. ok) return
-            acceleration(i, :) = one
-         end do
+         call one_by_one(self, t, q, p, acceleration, ok)
          return
       end if
       if (self%varying .or. .not. self%group_is_current) call load_lanes(self, t)
-      associate (b => self%scene%n_base, n => self%scene%n)
-         call lane_flexible_accelerations(self%group, self%group_work, q(:, b + 1:b + n), q(:, b + n + 1:b + 2*n), &
-                                          q(:, b + 2*n + 1:b + 3*n), p, acceleration, lane_ok)
-      end associate
+      call group_accelerations(self%group, self%group_work, q, p, acceleration, lane_ok)
       ok = all(lane_ok)
    end subroutine lane_accelerations
+
+   !> Lane after lane, for the assembled kernel.
+   subroutine one_by_one(self, t, q, p, acceleration, ok)
+      class(dynamics_type), intent(inout) :: self
+      real(wp), intent(in) :: t(lanes)
+      real(wp), contiguous, intent(in) :: q(:, :), p(:, :)    !! (lanes, n_dof)
+      real(wp), contiguous, intent(out) :: acceleration(:, :) !! (lanes, n_dof)
+      logical, intent(out) :: ok
+      integer :: i
+
+      associate (m => self%scene%n_dof)
+         if (.not. allocated(self%lane_q)) allocate (self%lane_q(m), self%lane_p(m), self%lane_rates(m))
+      end associate
+      do i = 1, lanes
+         self%lane_q(:) = q(i, :)
+         self%lane_p(:) = p(i, :)
+         call self%accelerations(t(i), self%lane_q, self%lane_p, self%lane_rates, ok)
+         if (.not. ok) return
+         acceleration(i, :) = self%lane_rates
+      end do
+   end subroutine one_by_one
 
    !> Put the forces at the time of each lane into the group.
    subroutine load_lanes(self, t)
@@ -145,7 +158,7 @@ contains
       if (.not. allocated(self%group)) then
          allocate (self%group)
          call new_lane_scene(self%group, self%scene, one_rod_each=.false.)
-         call new_lane_work(self%group_work, self%scene%n)
+         call new_lane_work(self%group_work, self%group)
       end if
       self%group%loaded = self%regime%on_nodes
       do i = 1, lanes

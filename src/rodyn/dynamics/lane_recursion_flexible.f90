@@ -5,61 +5,33 @@ module rodyn_lane_recursion_flexible
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp
    use rodyn_lanes, only: lanes
-   use rodyn_lane_scene, only: lane_scene, lane_rod
-   use rodyn_trigonometry, only: sine_cosine
+   use rodyn_lane_scene, only: lane_rod
+   use rodyn_lane_spacecraft, only: lane_spacecraft_accelerations
    implicit none (type, external)
    private
-   public :: lane_work, new_lane_work, lane_flexible_accelerations
-
-   !> Memory of the recursion.
-   type :: lane_work
-      real(wp), allocatable :: sine(:, :), cosine(:, :) !! of phi (lanes, 0:n); 0 and 1 at k = 0
-      real(wp), allocatable :: outward(:, :, :)         !! what the inward pass leaves for the outward pass (lanes, 8, n)
-   end type lane_work
+   public :: lane_flexible_recursion
 
 contains
 
-   subroutine new_lane_work(work, n)
-      type(lane_work), intent(out) :: work
-      integer, intent(in) :: n !! rods
-      allocate (work%sine(lanes, 0:n), work%cosine(lanes, 0:n), work%outward(lanes, 8, n), source=0.0_wp)
-      work%cosine(:, 0) = 1.0_wp
-   end subroutine new_lane_work
-
    !> p' in every lane.
-   subroutine lane_flexible_accelerations(group, work, phi, alpha, beta, p, acceleration, ok)
-      type(lane_scene), intent(in) :: group
-      type(lane_work), intent(inout) :: work
-      real(wp), contiguous, intent(in) :: phi(:, :), alpha(:, :), beta(:, :) !! (lanes, n) [rad]
-      real(wp), contiguous, intent(in) :: p(:, :)             !! rates (lanes, n_dof)
-      real(wp), contiguous, intent(out) :: acceleration(:, :) !! p' (lanes, n_dof)
-      logical, intent(out) :: ok(lanes) !! false: not finite, or M not positive definite
-
-      call sine_cosine(lanes*group%n, phi, work%sine(:, 1:), work%cosine(:, 1:))
-      call recursion(group%n, group%n_base, group%rods, group%rod_of, group%node_mass, group%stiffness, group%damping, &
-                     group%kink_moment, group%mass, group%inertia, group%hinge_x, group%hinge_y, group%base_force, &
-                     group%loaded, group%node_force, work%sine, work%cosine, phi, alpha, beta, p, work%outward, &
-                     acceleration, ok)
-   end subroutine lane_flexible_accelerations
-
-   subroutine recursion(n, n_base, rods, rod_of, node_mass, stiffness, damping, kink_moment, mass, inertia, hinge_x, &
-                        hinge_y, base_force, loaded, node_force, sine, cosine, phi, alpha, beta, p, outward, &
-                        acceleration, ok)
-      integer, intent(in) :: n, n_base
-      type(lane_rod), intent(in) :: rods(*)
-      integer, intent(in) :: rod_of(n)
-      real(wp), intent(in) :: node_mass(lanes, 0:n)
-      real(wp), dimension(lanes, 0:n - 1), intent(in) :: stiffness, damping, kink_moment
-      real(wp), dimension(lanes), intent(in) :: mass, inertia, hinge_x, hinge_y
-      real(wp), intent(in) :: base_force(lanes, 3)
-      logical, intent(in) :: loaded
-      real(wp), intent(in) :: node_force(lanes, 2, n)
-      real(wp), dimension(lanes, 0:n), intent(in) :: sine, cosine
-      real(wp), dimension(lanes, n), intent(in) :: phi, alpha, beta
-      real(wp), intent(in) :: p(lanes, n_base + 3*n)
-      real(wp), intent(inout) :: outward(lanes, 8, n)
-      real(wp), intent(out) :: acceleration(lanes, n_base + 3*n)
-      logical, intent(out) :: ok(lanes)
+   subroutine lane_flexible_recursion(n, n_base, rods, rod_of, node_mass, stiffness, damping, kink_moment, mass, inertia, &
+                                      hinge_x, hinge_y, base_force, loaded, node_force, sine, cosine, phi, alpha, beta, p, &
+                                      outward, acceleration, ok)
+      integer, intent(in) :: n, n_base           !! rods; 3 or 0 unknowns of the spacecraft
+      type(lane_rod), intent(in) :: rods(*)      !! distinct rods
+      integer, intent(in) :: rod_of(n)           !! which of them is rod k
+      real(wp), intent(in) :: node_mass(lanes, 0:n) !! mu [kg]
+      real(wp), dimension(lanes, 0:n - 1), intent(in) :: stiffness, damping, kink_moment !! C, D, C gamma
+      real(wp), dimension(lanes), intent(in) :: mass, inertia, hinge_x, hinge_y !! of the spacecraft
+      real(wp), intent(in) :: base_force(lanes, 3) !! X_C, Y_C, M_C, moving axes
+      logical, intent(in) :: loaded              !! node_force is to be used
+      real(wp), intent(in) :: node_force(lanes, 2, n) !! X, Y at nodes, moving axes [N]
+      real(wp), dimension(lanes, 0:n), intent(in) :: sine, cosine !! of phi; 0 and 1 at k = 0
+      real(wp), dimension(lanes, n), intent(in) :: phi, alpha, beta !! [rad]
+      real(wp), intent(in) :: p(lanes, n_base + 3*n)        !! rates
+      real(wp), intent(inout) :: outward(lanes, 8, n)       !! workspace
+      real(wp), intent(out) :: acceleration(lanes, n_base + 3*n) !! p'
+      logical, intent(out) :: ok(lanes)          !! false: not finite, or M not positive definite
 
       real(wp), dimension(lanes) :: pee, pen, pnn, det, be, bn, omega, moment_out, smallest, ae, an, omega_rate
       integer :: k, i, ip, ia, ib
@@ -82,7 +54,8 @@ contains
          if (loaded) call add_node_force(node_force(:, :, k), sine(:, k), cosine(:, k), be, bn)
          call add_rod(k > 1)
       end do
-      call add_spacecraft()
+      call lane_spacecraft_accelerations(n_base, mass, inertia, hinge_x, hinge_y, p, node_mass(:, 0), pee, pen, pnn, det, &
+                                         be, bn, moment_out, base_force, acceleration, ae, an, omega_rate, smallest)
       do k = 1, n
          call accelerate_rod()
       end do
@@ -177,50 +150,6 @@ contains
          end associate
       end subroutine add_rod
 
-      !> The spacecraft, `spacecraft_accelerations` of `rodyn_spacecraft`; `moment_out` is T_0.
-      subroutine add_spacecraft()
-         real(wp) :: pxx, pyy, d, d2, d3, inverse, cx, cy, px, py, w, w2, m11, m22, gx, gy, fx, fy, w_rate, mu, x, y
-
-         ae = 0.0_wp
-         an = 0.0_wp
-         omega_rate = 0.0_wp
-         if (n_base == 0) return
-         !$omp simd
-         do i = 1, lanes
-            w = p(i, 3)
-            w2 = w*w
-            mu = node_mass(i, 0)
-            x = hinge_x(i)
-            y = hinge_y(i)
-            pxx = pee(i) + mu
-            pyy = pnn(i) + mu
-            d = det(i) + mu*(pee(i) + pnn(i) + mu)
-            m11 = mass(i) + pxx
-            m22 = mass(i) + pyy
-            d2 = mass(i)*(mass(i) + (pxx + pyy)) + d
-            inverse = 1.0_wp/d2
-            cx = be(i) - w2*(pxx*x + pen(i)*y)
-            cy = bn(i) - w2*(pen(i)*x + pyy*y)
-            px = pen(i)*x - pxx*y
-            py = pyy*x - pen(i)*y
-            gx = mass(i)*((pxx*base_force(i, 1) + pen(i)*base_force(i, 2)) + (m22*cx - pen(i)*cy)) + d*base_force(i, 1)
-            gy = mass(i)*((pen(i)*base_force(i, 1) + pyy*base_force(i, 2)) + (m11*cy - pen(i)*cx)) + d*base_force(i, 2)
-            d3 = inertia(i)*d2 + mass(i)*(mass(i)*(x*py - y*px) + d*(x*x + y*y))
-            smallest(i) = min(smallest(i), m11, d2, d3)
-            w_rate = ((base_force(i, 3) + moment_out(i))*d2 - (x*gy - y*gx))/d3
-            fx = (base_force(i, 1) - cx) - px*w_rate
-            fy = (base_force(i, 2) - cy) - py*w_rate
-            ae(i) = (m22*fx - pen(i)*fy)*inverse
-            an(i) = (m11*fy - pen(i)*fx)*inverse
-            acceleration(i, 1) = ae(i) + w*p(i, 2)
-            acceleration(i, 2) = an(i) - w*p(i, 1)
-            acceleration(i, 3) = w_rate
-            omega_rate(i) = w_rate
-            ae(i) = ae(i) - y*w_rate - w2*x
-            an(i) = an(i) + x*w_rate - w2*y
-         end do
-      end subroutine add_spacecraft
-
       !> phi'', alpha'', beta'' of rod k, then the acceleration of its outer node.
       subroutine accelerate_rod()
          real(wp) :: r, across, w_rate
@@ -239,7 +168,7 @@ contains
          end associate
       end subroutine accelerate_rod
 
-   end subroutine recursion
+   end subroutine lane_flexible_recursion
 
    !> Force on a node, as a bias of the chain outboard of it.
    subroutine add_node_force(force, sine, cosine, be, bn)

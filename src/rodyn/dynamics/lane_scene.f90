@@ -10,7 +10,7 @@ module rodyn_lane_scene
    use rodyn_scene, only: scene_type
    implicit none (type, external)
    private
-   public :: lane_rod, lane_scene, new_lane_scene, put_scene, suits_lanes
+   public :: lane_rod, lane_scene, new_lane_scene, put_scene, suits_lanes, are_alike
 
    !> What the recursion reads of a rod (`rodyn_rod_constants`).
    type :: lane_rod
@@ -24,13 +24,17 @@ module rodyn_lane_scene
       integer :: n_base = 3 !! 3: free spacecraft, 0: fixed
       integer :: n_dof = 0  !! length of p
       logical :: flexible = .true.       !! alpha and beta are unknowns
+      logical :: series = .false.        !! they follow from the hinge moments
+      logical :: damped = .false.        !! some hinge has a damper, if `series`; otherwise not used
       logical :: loaded = .false.        !! some force acts on a node in some lane
       type(lane_rod), allocatable :: rods(:) !! distinct rods
       integer, allocatable :: rod_of(:)      !! which of them is rod k (n)
       real(wp), allocatable :: node_mass(:, :) !! mu (lanes, 0:n) [kg]
       real(wp), allocatable :: stiffness(:, :) !! C (lanes, 0:n-1) [N m/rad]
       real(wp), allocatable :: damping(:, :)   !! D (lanes, 0:n-1) [N m s/rad]
+      real(wp), allocatable :: kink(:, :)      !! gamma (lanes, 0:n-1) [rad]
       real(wp), allocatable :: kink_moment(:, :) !! C gamma (lanes, 0:n-1) [N m]
+      real(wp), allocatable, dimension(:, :) :: lower, pivot, upper !! factors of `rodyn_three_moments` (lanes, 0:n-1), if `series`
       real(wp), dimension(lanes) :: mass = 1.0_wp, inertia = 1.0_wp, hinge_x = 0.0_wp, hinge_y = 0.0_wp !! of the spacecraft
       real(wp), allocatable :: base_force(:, :)    !! X_C, Y_C, M_C (lanes, 3), moving axes
       real(wp), allocatable :: node_force(:, :, :) !! X, Y (lanes, 2, n), moving axes [N]
@@ -41,8 +45,22 @@ contains
    !> May this scene stand in a lane?
    pure logical function suits_lanes(scene)
       type(scene_type), intent(in) :: scene
-      suits_lanes = scene%dynamic_bending .and. .not. scene%assembled
+      suits_lanes = .not. scene%assembled .and. size(scene%hinges%relaxing) == 0
    end function suits_lanes
+
+   !> May these scenes, each of which suits lanes, stand side by side? They must not make each other compute anything
+   !> that they would not compute alone.
+   pure logical function are_alike(a, b)
+      type(scene_type), intent(in) :: a, b
+      are_alike = a%n == b%n .and. a%n_base == b%n_base .and. (a%dynamic_bending .eqv. b%dynamic_bending) .and. &
+                  (a%quasistatic .eqv. b%quasistatic) .and. (has_series_dampers(a) .eqv. has_series_dampers(b)) .and. &
+                  (any(a%loads%loads%target == 'node') .eqv. any(b%loads%loads%target == 'node'))
+   end function are_alike
+
+   pure logical function has_series_dampers(scene)
+      type(scene_type), intent(in) :: scene
+      has_series_dampers = scene%quasistatic .and. scene%hinges%has_damping
+   end function has_series_dampers
 
    !> A group with the same scene in every lane.
    subroutine new_lane_scene(group, scene, one_rod_each)
@@ -55,6 +73,8 @@ contains
       group%n_base = scene%n_base
       group%n_dof = scene%n_dof
       group%flexible = scene%dynamic_bending
+      group%series = scene%quasistatic
+      group%damped = has_series_dampers(scene)
       associate (n => scene%n)
          if (one_rod_each) then
             allocate (group%rods(n))
@@ -64,8 +84,11 @@ contains
             group%rod_of = scene%rod_of
          end if
          allocate (group%node_mass(lanes, 0:n), group%stiffness(lanes, 0:n - 1), group%damping(lanes, 0:n - 1), &
-                   group%kink_moment(lanes, 0:n - 1), group%base_force(lanes, 3), group%node_force(lanes, 2, n), &
+                   group%kink(lanes, 0:n - 1), group%kink_moment(lanes, 0:n - 1), group%base_force(lanes, 3), &
+                   group%node_force(lanes, 2, n), &
                    source=0.0_wp)
+         if (group%series) allocate (group%lower(lanes, 0:n - 1), group%pivot(lanes, 0:n - 1), group%upper(lanes, 0:n - 1), &
+                                     source=0.0_wp)
       end associate
       do i = 1, lanes
          call put_scene(group, i, scene)
@@ -85,6 +108,7 @@ contains
       group%node_mass(lane, :) = scene%node_mass
       group%stiffness(lane, :) = scene%hinges%stiffness
       group%damping(lane, :) = scene%hinges%damping
+      group%kink(lane, :) = scene%hinges%kink
       group%kink_moment(lane, :) = scene%hinges%stiffness*scene%hinges%kink
       group%mass(lane) = scene%body%mass
       group%inertia(lane) = scene%body%inertia
@@ -92,6 +116,12 @@ contains
       group%hinge_y(lane) = scene%body%hinge_y
       group%base_force(lane, :) = 0.0_wp
       group%node_force(lane, :, :) = 0.0_wp
+      if (.not. group%series) return
+      associate (n => scene%n, series => scene%hinges%series)
+         group%lower(lane, 1:n - 1) = series%lower
+         group%pivot(lane, :) = series%pivot
+         group%upper(lane, 0:n - 2) = series%upper
+      end associate
    end subroutine put_scene
 
    pure subroutine put_rod(rods, lane, rod)

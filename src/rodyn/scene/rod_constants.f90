@@ -49,6 +49,7 @@ contains
 
       ok = .true.
       rod%length = length
+      rod%length_2 = length**2
       rod%bending_stiffness = bending_stiffness
       rod%kappa = 2.0_wp*bending_stiffness/length
       if (lumped) return
@@ -66,7 +67,6 @@ contains
          rod%m2_reduced = rod%inertia%m2
       end if
       rod%central = rod%m0_reduced*rod%m2_reduced - rod%m1_reduced**2
-      rod%length_2 = length**2
       rod%length_m1 = length*rod%m1_reduced
       rod%offset = length*rod%m0_reduced - rod%m1_reduced
       rod%outer = rod%m2_reduced - 2.0_wp*length*rod%m1_reduced + length**2*rod%m0_reduced

@@ -22,7 +22,8 @@ module rodyn_sweep_case
    use rodyn_sweep_plan, only: sweep_plan
    implicit none (type, external)
    private
-   public :: case_result, case_shape, pulse_type, build_case, build_values, run_sweep_case, new_case_shape
+   public :: case_result, case_shape, pulse_type, keeper_type, build_case, build_values, new_case_shape
+   public :: clear_result, prepare_case, integrate_case, keep_final, conclude_case
    public :: status_done, status_failed, status_stopped
 
    integer, parameter :: status_done = 1, status_failed = 2
@@ -173,40 +174,8 @@ contains
       end if
    end subroutine follow_inertia
 
-   !> Compute one case. Nothing that happens to it is an error of the sweep.
-   subroutine run_sweep_case(sweep, plan, shape, case, pulse, kept)
-      type(sweep_config), intent(in) :: sweep
-      type(sweep_plan), intent(in) :: plan
-      type(case_shape), intent(in) :: shape
-      integer, intent(in) :: case
-      class(pulse_type), target, intent(inout) :: pulse
-      type(case_result), target, intent(inout) :: kept !! its arrays are used again
-      type(case_config) :: config
-      type(error_type), allocatable :: error
-      integer(i8) :: clock_start, clock_end, clock_rate
-      logical, target :: late
-
-      call system_clock(clock_start, clock_rate)
-      call clear(kept, shape, case)
-      late = .false.
-      call build_case(sweep, plan, case, config, error)
-      if (.not. allocated(error)) call integrate(config, sweep, shape, pulse, clock_start, late, kept, error)
-      call system_clock(clock_end)
-      kept%wall_seconds = real(clock_end - clock_start, wp)/real(clock_rate, wp)
-      kept%status = status_done
-      if (.not. allocated(error)) return
-      kept%status = status_failed
-      kept%message = error%message
-      if (late) then
-         kept%message = 'case_seconds = '//short(sweep%case_seconds)//' s exceeded'
-      else if (error%exit_code == exit_stopped) then
-         kept%status = status_stopped
-      end if
-      call make_nan(kept)
-   end subroutine run_sweep_case
-
    !> Ready for a case.
-   subroutine clear(kept, shape, case)
+   subroutine clear_result(kept, shape, case)
       type(case_result), intent(inout) :: kept
       type(case_shape), intent(in) :: shape
       integer, intent(in) :: case
@@ -225,7 +194,7 @@ contains
       kept%integration_seconds = 0.0_wp
       kept%message = ''
       call make_nan(kept)
-   end subroutine clear
+   end subroutine clear_result
 
    subroutine make_nan(kept)
       type(case_result), intent(inout) :: kept
@@ -237,31 +206,54 @@ contains
       kept%series = nan
    end subroutine make_nan
 
-   !> Compile, integrate, keep.
-   subroutine integrate(config, sweep, shape, pulse, clock_start, late, kept, error)
-      type(case_config), intent(in) :: config
+   !> Everything about a case that comes before its integration. `keeper%kept` is the caller's to set.
+   subroutine prepare_case(sweep, plan, shape, case, motion, y, times, t_end, keeper, choice, error)
       type(sweep_config), intent(in) :: sweep
+      type(sweep_plan), intent(in) :: plan
       type(case_shape), intent(in) :: shape
-      class(pulse_type), target, intent(inout) :: pulse
-      integer(i8), intent(in) :: clock_start
-      logical, target, intent(inout) :: late
-      type(case_result), target, intent(inout) :: kept
+      integer, intent(in) :: case
+      type(motion_type), intent(inout) :: motion
+      real(wp), allocatable, intent(out) :: y(:)     !! state at t = 0
+      real(wp), allocatable, intent(out) :: times(:) !! at which the keeper wants to see it [s]
+      real(wp), intent(out) :: t_end                 !! [s]
+      type(keeper_type), intent(inout) :: keeper
+      type(method_choice), intent(out) :: choice
       type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
       type(scene_type) :: scene
-      type(motion_type), target :: motion
-      type(keeper_type) :: keeper
-      type(case_monitor), target :: monitor
-      type(method_choice) :: choice
-      type(solver_statistics) :: stats
-      class(integrator_type), allocatable :: integrator
-      real(wp), allocatable :: y(:), times(:)
-      integer(i8) :: clock_a, clock_b, clock_rate
 
-      call new_scene(scene, config, error)
+      t_end = 0.0_wp
+      call build_case(sweep, plan, case, config, error)
+      if (.not. allocated(error)) call new_scene(scene, config, error)
       if (.not. allocated(error)) call new_motion(motion, scene, .false., error)
       if (allocated(error)) return
+      t_end = config%t_end
       call initial_state(motion, config%initial, y)
-      call choose_method(choice, config%solver, options_of(config), scene, y, config%t_end)
+      call choose_method(choice, config%solver, options_of(config), scene, y, t_end)
+      keeper%row = new_run_row(scene%n)
+      keeper%n_rods = shape%n_rods
+      keeper%keep_series = sweep%keep_series
+      call merge_times(config, sweep%probe_times, shape%outputs, times, keeper%probe_of, keeper%output_of)
+   end subroutine prepare_case
+
+   !> Integrate a prepared case by itself, and keep what is wanted.
+   subroutine integrate_case(sweep, choice, times, t_end, pulse, clock_start, motion, y, keeper, late, error)
+      type(sweep_config), intent(in) :: sweep
+      type(method_choice), intent(in) :: choice
+      real(wp), intent(in) :: times(:), t_end   !! [s]
+      class(pulse_type), target, intent(inout) :: pulse
+      integer(i8), intent(in) :: clock_start    !! when work on the case began [counts]
+      type(motion_type), target, intent(inout) :: motion
+      real(wp), contiguous, intent(inout) :: y(:)
+      type(keeper_type), intent(inout) :: keeper
+      logical, target, intent(out) :: late      !! it took longer than it may
+      type(error_type), allocatable, intent(out) :: error
+      type(case_monitor), target :: monitor
+      type(solver_statistics) :: stats
+      class(integrator_type), allocatable :: integrator
+      integer(i8) :: clock_a, clock_b, clock_rate
+
+      late = .false.
       call new_integrator(integrator, motion, choice%method, choice%options, error)
       if (allocated(error)) return
       monitor%pulse => pulse
@@ -269,28 +261,50 @@ contains
       monitor%limit = sweep%case_seconds
       monitor%late => late
       call integrator%set_monitor(monitor)
-      keeper%row = new_run_row(scene%n)
-      keeper%n_rods = shape%n_rods
-      keeper%keep_series = sweep%keep_series
-      keeper%kept => kept
-      call merge_times(config, sweep%probe_times, shape%outputs, times, keeper%probe_of, keeper%output_of)
-
       call system_clock(clock_a, clock_rate)
-      call simulate(motion, integrator, times, config%t_end, keeper, y, kept%t_reached, error)
+      call simulate(motion, integrator, times, t_end, keeper, y, keeper%kept%t_reached, error)
       call system_clock(clock_b)
-      kept%integration_seconds = real(clock_b - clock_a, wp)/real(clock_rate, wp)
+      keeper%kept%integration_seconds = real(clock_b - clock_a, wp)/real(clock_rate, wp)
       stats = integrator%statistics()
-      kept%n_steps = stats%n_steps
-      kept%n_rhs = stats%n_rhs
+      keeper%kept%n_steps = stats%n_steps
+      keeper%kept%n_rhs = stats%n_rhs
       call integrator%finalize()
-      if (allocated(error)) return
+      if (.not. allocated(error)) call keep_final(motion, t_end, y, keeper, error)
+   end subroutine integrate_case
+
+   !> Keep the state at the end of a case.
+   subroutine keep_final(motion, t_end, y, keeper, error)
+      type(motion_type), intent(in) :: motion
+      real(wp), intent(in) :: t_end, y(:)
+      type(keeper_type), intent(inout) :: keeper
+      type(error_type), allocatable, intent(out) :: error
+
       if (.not. all(abs(y) <= huge(y))) then
          call raise(error, 'the final state is not finite')
          return
       end if
-      call fill_row(motion, config%t_end, y, 0.0_wp, keeper%row)
-      call place(keeper%row, keeper%n_rods, kept%final)
-   end subroutine integrate
+      call fill_row(motion, t_end, y, 0.0_wp, keeper%row)
+      call place(keeper%row, keeper%n_rods, keeper%kept%final)
+   end subroutine keep_final
+
+   !> Status and message of a case that has ended. Nothing that happens to a case is an error of the sweep.
+   subroutine conclude_case(sweep, late, error, kept)
+      type(sweep_config), intent(in) :: sweep
+      logical, intent(in) :: late
+      type(error_type), allocatable, intent(in) :: error
+      type(case_result), intent(inout) :: kept
+
+      kept%status = status_done
+      if (.not. allocated(error)) return
+      kept%status = status_failed
+      kept%message = error%message
+      if (late) then
+         kept%message = 'case_seconds = '//short(sweep%case_seconds)//' s exceeded'
+      else if (error%exit_code == exit_stopped) then
+         kept%status = status_stopped
+      end if
+      call make_nan(kept)
+   end subroutine conclude_case
 
    !> The times at which states are wanted, in order: probes up to the end of the case, and outputs.
    subroutine merge_times(config, probe_times, outputs, times, probe_of, output_of)

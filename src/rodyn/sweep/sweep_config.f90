@@ -35,6 +35,7 @@ module rodyn_sweep_config
       real(wp), allocatable :: probe_times(:)               !! increasing [s]
       logical :: keep_series = .false.
       real(wp) :: case_seconds = 0.0_wp                     !! wall time limit; 0: none
+      logical :: lanes = .true.                             !! like cases may go side by side
       type(sweep_axis), allocatable :: axes(:)
       integer :: n_dimensions = 0
    end type sweep_config

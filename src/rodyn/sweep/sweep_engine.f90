@@ -10,8 +10,7 @@ module rodyn_sweep_engine
    use rodyn_lapack, only: use_one_thread
    use rodyn_posix, only: ignore_file_size_signal, path_exists
    use rodyn_posix_files, only: stop_signal, watch_signals, write_text_file
-   use rodyn_sweep_case, only: case_result, case_shape, new_case_shape, pulse_type, run_sweep_case, status_done, &
-      status_failed, status_stopped
+   use rodyn_sweep_case, only: case_result, case_shape, new_case_shape, status_done, status_failed, status_stopped
    use rodyn_sweep_config, only: sweep_config
    use rodyn_sweep_directory, only: sweep_directory, result_name
    use rodyn_sweep_forecast, only: print_forecast
@@ -22,6 +21,7 @@ module rodyn_sweep_engine
    use rodyn_sweep_ranks, only: rank_group, at_done, at_errors, at_failed, at_next, at_stopped
    use rodyn_sweep_reader, only: find_base, parse_sweep
    use rodyn_sweep_result, only: result_is_sound, write_result
+   use rodyn_sweep_worker, only: case_feed, lanes_text, run_cases
    use rodyn_sweep_writer, only: shard_writer
    use rodyn_text, only: to_text
    implicit none (type, external)
@@ -54,12 +54,18 @@ module rodyn_sweep_engine
       logical :: stopped = .false.
    end type engine_type
 
-   !> Looks around while a case is computed.
-   type, extends(pulse_type) :: engine_pulse
+   !> Hands out what is to be computed, takes the results, and looks around meanwhile.
+   type, extends(case_feed) :: engine_feed
       type(engine_type), pointer :: engine => null()
+      integer :: chunk = 1                     !! cases that are fetched at once
+      integer :: at = 0, last = 0              !! of the fetched ones: the one handed out last, the last
+      logical :: ended = .false.               !! none can be fetched
+      type(error_type), allocatable :: error   !! results could not be written
    contains
       procedure :: beat
-   end type engine_pulse
+      procedure :: next
+      procedure :: keep
+   end type engine_feed
 
    character(len=1), parameter :: nl = new_line('a')
 
@@ -298,6 +304,7 @@ contains
          line = line//'; one process'
       end if
       write (output_unit, '(a)') 'sweep   '//line
+      write (output_unit, '(a)') 'lanes   '//lanes_text(engine%sweep, engine%plan)
       flush (output_unit)
    end subroutine tell_start
 
@@ -312,33 +319,17 @@ contains
    subroutine compute(engine, error)
       type(engine_type), target, intent(inout) :: engine
       type(error_type), allocatable, intent(out) :: error
-      type(engine_pulse), target :: pulse
-      type(case_result), target :: kept
-      integer(i8) :: first, ignored
-      integer :: chunk, i, n
+      type(engine_feed), target :: feed
+      integer(i8) :: ignored
+      integer :: n
 
       n = size(engine%todo)
-      chunk = 1
-      if (engine%ranks%count > 1) chunk = max(1, min(16, n/(64*engine%ranks%count)))
-      pulse%engine => engine
+      feed%engine => engine
+      if (engine%ranks%count > 1) feed%chunk = max(1, min(16, n/(64*engine%ranks%count)))
       call engine%writer%open(engine%directory%path, engine%tag, engine%next_number, engine%directory%fingerprint, &
                               engine%shape)
-      hand_out: do
-         first = engine%ranks%add(at_next, chunk)
-         do i = int(min(first, int(n, i8))) + 1, int(min(first + chunk, int(n, i8)))
-            call look_around(engine)
-            if (engine%stopped) exit hand_out
-            call run_sweep_case(engine%sweep, engine%plan, engine%shape, engine%todo(i), pulse, kept)
-            if (kept%status == status_stopped) exit hand_out
-            kept%attempt = engine%attempt(i)
-            call engine%writer%add(kept, error)
-            if (allocated(error)) exit hand_out
-            if (kept%status == status_done) engine%mine_done = engine%mine_done + 1
-            if (kept%status == status_failed) engine%mine_failed = engine%mine_failed + 1
-         end do
-         if (first + chunk >= n) exit hand_out
-         if (engine%ranks%add(at_errors, 0) > 0) exit hand_out
-      end do hand_out
+      call run_cases(engine%sweep, engine%plan, engine%shape, feed)
+      call move_alloc(feed%error, error)
       if (.not. allocated(error)) call engine%writer%seal(error)
       if (len(stop_signal()) > 0 .and. engine%ranks%add(at_next, 0) < n) ignored = engine%ranks%add(at_next, n)
       if (len(stop_signal()) > 0) ignored = engine%ranks%add(at_stopped, 1)
@@ -377,13 +368,57 @@ contains
       engine%counts%failed = int(failed)
    end subroutine share_counts
 
-   !> Called from inside a case.
+   !> Called from time to time, also from inside a case.
    subroutine beat(self, stop_now)
-      class(engine_pulse), intent(inout) :: self
+      class(engine_feed), intent(inout) :: self
       logical, intent(out) :: stop_now
       call look_around(self%engine)
       stop_now = self%engine%stopped
    end subroutine beat
+
+   !> The next case that nobody has.
+   subroutine next(self, ticket, case)
+      class(engine_feed), intent(inout) :: self
+      integer, intent(out) :: ticket, case
+      integer(i8) :: first, n
+
+      case = 0
+      ticket = 0
+      associate (engine => self%engine)
+         n = size(engine%todo)
+         if (self%at == self%last .and. .not. self%ended) then
+            if (self%last > 0) self%ended = engine%ranks%add(at_errors, 0) > 0
+            if (self%ended) return
+            first = engine%ranks%add(at_next, self%chunk)
+            self%at = int(min(first, n))
+            self%last = int(min(first + self%chunk, n))
+            self%ended = first + self%chunk >= n
+         end if
+         if (self%at == self%last) return
+         self%at = self%at + 1
+         ticket = self%at
+         case = engine%todo(ticket)
+      end associate
+   end subroutine next
+
+   !> Put a result onto the disk.
+   subroutine keep(self, ticket, kept, stop_now)
+      class(engine_feed), intent(inout) :: self
+      integer, intent(in) :: ticket
+      type(case_result), intent(inout) :: kept
+      logical, intent(out) :: stop_now
+
+      stop_now = allocated(self%error) .or. kept%status == status_stopped
+      if (stop_now) return
+      associate (engine => self%engine)
+         kept%attempt = engine%attempt(ticket)
+         call engine%writer%add(kept, self%error)
+         stop_now = allocated(self%error)
+         if (stop_now) return
+         if (kept%status == status_done) engine%mine_done = engine%mine_done + 1
+         if (kept%status == status_failed) engine%mine_failed = engine%mine_failed + 1
+      end associate
+   end subroutine keep
 
    !> All cases of this process are on the disk: merge, if those of all others are, too.
    subroutine conclude(engine, exit_code, error)

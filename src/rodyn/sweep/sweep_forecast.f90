@@ -4,10 +4,12 @@ module rodyn_sweep_forecast
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type
    use rodyn_progress, only: duration_text
-   use rodyn_sweep_case, only: case_result, case_shape, pulse_type, run_sweep_case, status_done
+   use rodyn_lanes, only: lanes
+   use rodyn_sweep_case, only: case_result, case_shape, status_done
    use rodyn_sweep_config, only: sweep_config, value_text
    use rodyn_sweep_plan, only: sweep_plan
    use rodyn_sweep_record, only: record_words
+   use rodyn_sweep_worker, only: case_feed, lanes_text, run_cases, uses_lanes
    use rodyn_text, only: to_text
    implicit none (type, external)
    private
@@ -17,12 +19,20 @@ module rodyn_sweep_forecast
    real(wp), parameter :: most_seconds = 5.0_wp   !! for each of them [s]
    integer, parameter :: most_rows = 10000        !! of the table
 
-   !> Lets a case go on for some seconds.
-   type, extends(pulse_type) :: patience
-      integer(i8) :: clock_start = 0
+   !> Hands out some cases, lets them go on for some seconds, and adds up what they took.
+   type, extends(case_feed) :: sample_feed
+      integer, allocatable :: cases(:)
+      integer :: at = 0, last = 0       !! of the cases: handed out last, to be handed out
+      integer(i8) :: clock_start = 0    !! of the one handed out last
+      real(wp) :: patience = most_seconds !! [s]
+      real(wp) :: total = 0.0_wp        !! wall time of the cases [s]
+      integer :: n_kept = 0
+      logical :: cut = .false.          !! some were cut short or failed
    contains
       procedure :: beat
-   end type patience
+      procedure :: next
+      procedure :: keep
+   end type sample_feed
 
 contains
 
@@ -97,26 +107,30 @@ contains
       type(sweep_plan), intent(in) :: plan
       type(case_shape), intent(in) :: shape
       integer, intent(in) :: n_computed
-      type(patience), target :: pulse
-      type(case_result), target :: kept
-      real(wp) :: total
-      integer :: case, i, n
-      logical :: cut
+      type(sample_feed) :: feed
+      integer :: i, n
 
-      n = min(most_timed, plan%n_cases)
-      total = 0.0_wp
-      cut = .false.
-      do i = 1, n
-         case = 1
-         if (n > 1) case = 1 + nint(real(plan%n_cases - 1, wp)*real(i - 1, wp)/real(n - 1, wp))
-         call system_clock(pulse%clock_start)
-         call run_sweep_case(sweep, plan, shape, case, pulse, kept)
-         if (kept%status /= status_done) cut = .true.
-         total = total + kept%wall_seconds
-      end do
-      write (output_unit, '(a)') 'time    about '//duration_text(total/n*n_computed)//' on one core'// &
-         trim(merge(' or more', '        ', cut))//', by '//to_text(n)//' cases of '//short_number(1000.0_wp*total/n)// &
-         ' ms on average'//trim(merge(' (some were cut short or failed)', '                                ', cut))
+      n = min(merge(lanes, most_timed, uses_lanes(sweep, plan)), plan%n_cases)
+      feed%cases = [(1, i=1, n)]
+      if (n > 1) feed%cases = [(1 + nint(real(plan%n_cases - 1, wp)*real(i - 1, wp)/real(n - 1, wp)), i=1, n)]
+      if (uses_lanes(sweep, plan)) then
+         feed%patience = 2.0_wp*most_seconds
+         feed%last = n
+         call run_cases(sweep, plan, shape, feed)
+      else
+         do i = 1, n
+            feed%last = i
+            feed%clock_start = 0
+            call run_cases(sweep, plan, shape, feed)
+         end do
+      end if
+      associate (mean => feed%total/max(1, feed%n_kept), cut => feed%cut)
+         write (output_unit, '(a)') 'lanes   '//lanes_text(sweep, plan)
+         write (output_unit, '(a)') 'time    about '//duration_text(mean*n_computed)//' on one core'// &
+            trim(merge(' or more', '        ', cut))//', by '//to_text(feed%n_kept)//' cases of '// &
+            short_number(1000.0_wp*mean)//' ms on average'// &
+            trim(merge(' (some were cut short or failed)', '                                ', cut))
+      end associate
    end subroutine print_time
 
    !> Shards and result; states do not compress.
@@ -139,11 +153,35 @@ contains
    end function short_number
 
    subroutine beat(self, stop_now)
-      class(patience), intent(inout) :: self
+      class(sample_feed), intent(inout) :: self
       logical, intent(out) :: stop_now
       integer(i8) :: now, rate
       call system_clock(now, rate)
-      stop_now = real(now - self%clock_start, wp) > most_seconds*real(rate, wp)
+      stop_now = self%clock_start > 0 .and. real(now - self%clock_start, wp) > self%patience*real(rate, wp)
    end subroutine beat
+
+   subroutine next(self, ticket, case)
+      class(sample_feed), intent(inout) :: self
+      integer, intent(out) :: ticket, case
+      ticket = 0
+      case = 0
+      if (self%at == self%last) return
+      self%at = self%at + 1
+      ticket = self%at
+      case = self%cases(ticket)
+      call system_clock(self%clock_start)
+   end subroutine next
+
+   subroutine keep(self, ticket, kept, stop_now)
+      class(sample_feed), intent(inout) :: self
+      integer, intent(in) :: ticket
+      type(case_result), intent(inout) :: kept
+      logical, intent(out) :: stop_now
+      associate (unused => ticket); end associate
+      if (kept%status /= status_done) self%cut = .true.
+      self%total = self%total + kept%wall_seconds
+      self%n_kept = self%n_kept + 1
+      stop_now = .false.
+   end subroutine keep
 
 end module rodyn_sweep_forecast

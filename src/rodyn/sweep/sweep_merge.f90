@@ -16,6 +16,7 @@ module rodyn_sweep_merge
    use rodyn_sweep_config, only: sweep_config
    use rodyn_sweep_index, only: sweep_index
    use rodyn_sweep_plan, only: sweep_plan
+   use rodyn_sweep_worker, only: lanes_text
    implicit none (type, external)
    private
    public :: merge_sweep
@@ -181,6 +182,7 @@ contains
       call put('input', sweep%text)
       call put('base_input', sweep%base_text)
       call put('resolved_base', resolved_case(sweep%base_case))
+      call put('lanes', lanes_text(sweep, plan))
       if (.not. allocated(error)) call file%put_attribute('/', 'n_cases', plan%n_cases, error)
 
    contains

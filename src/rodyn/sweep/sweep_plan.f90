@@ -12,7 +12,7 @@ module rodyn_sweep_plan
    use rodyn_text_buffer, only: text_buffer
    implicit none (type, external)
    private
-   public :: sweep_plan, new_plan, plan_text
+   public :: sweep_plan, new_plan, plan_text, fewest_alike
 
    !> Axes that advance together
    type :: plan_dimension
@@ -159,6 +159,27 @@ contains
       same_as = same_as + 1
    end function same_as
 
+   !> At least so many cases differ in numbers only, from every case: those of the dimensions on which nothing depends but
+   !> numbers.
+   pure integer function fewest_alike(sweep, plan)
+      type(sweep_config), intent(in) :: sweep
+      type(sweep_plan), intent(in) :: plan
+      integer :: a, d
+
+      fewest_alike = 1
+      do d = 1, sweep%n_dimensions
+         if (any([(sweep%axes(a)%dimension == d .and. changes_kind(sweep%axes(a)), a=1, size(sweep%axes))])) cycle
+         fewest_alike = fewest_alike*plan%dimensions(d)%length
+      end do
+   end function fewest_alike
+
+   !> May cases with different values of this key be of different kinds?
+   pure logical function changes_kind(axis)
+      type(sweep_axis), intent(in) :: axis
+      changes_kind = axis%textual .or. axis%key == 'chain.n_rods' .or. axis%key == 'solver.order' .or. &
+                     axis%key == 'solver.fixed_step'
+   end function changes_kind
+
    !> All that results depend on, one line each: what a resumed sweep must have in common with the first.
    !> (The wall limit is not there: --retry-failed may give cases more time.)
    function plan_text(sweep) result(text)
@@ -175,6 +196,7 @@ contains
          call buffer%line('probe time: '//to_text(sweep%probe_times(i)))
       end do
       call buffer%line('keep_series: '//to_text(sweep%keep_series))
+      call buffer%line('lanes: '//to_text(sweep%lanes))
       do a = 1, size(sweep%axes)
          associate (axis => sweep%axes(a))
             do i = 1, axis_size(axis)

@@ -131,6 +131,7 @@ contains
       call loader%field('probe_times', sweep%probe_times)
       call loader%field('keep_series', sweep%keep_series)
       call loader%field('case_seconds', sweep%case_seconds)
+      call loader%field('lanes', sweep%lanes)
       call loader%close_group()
       if (base_is_sound .and. entry_of(checked, 'sweep', 1, 'probe_times', any_state=.true.) == 0) &
          sweep%probe_times = [sweep%base_case%t_end]

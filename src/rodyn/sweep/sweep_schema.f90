@@ -22,6 +22,8 @@ module rodyn_sweep_schema
          help='keep the state at all n_outputs + 1 output times of each case'), &
       schema_row('sweep', 'case_seconds', type_real, unit='s', default='0.0', rule=not_negative, &
          help='a case that computes longer than this has failed; 0: no limit'), &
+      schema_row('sweep', 'lanes', type_logical, default='.true.', &
+         help='like cases by dop853 side by side in vector lanes, eight at once; false: one by one'), &
       schema_row('axis', 'key', type_text, rule=up_to, high=80.0_wp, example="'mass_ratio'", &
          help='group.name as in a case, with (3) for one element; or mass_ratio, of all nodes to all rods'), &
       schema_row('axis', 'values', type_real, any_list, default='depends', example='2, 4, 8', &
