@@ -153,7 +153,7 @@ contains
    subroutine load_lanes(self, t)
       type(dynamics_type), intent(inout) :: self
       real(wp), intent(in) :: t(lanes) !! [s]
-      integer :: i
+      integer :: i, k
 
       if (.not. allocated(self%group)) then
          allocate (self%group)
@@ -164,7 +164,11 @@ contains
       do i = 1, lanes
          if (self%varying) call evaluate_loads(self%forces, self%regime, t(i), fresh=.false.)
          self%group%base_force(i, :) = self%forces%base
-         if (self%regime%on_nodes) self%group%node_force(i, :, :) = self%forces%node
+         if (.not. self%regime%on_nodes) cycle
+         do k = 1, self%scene%n ! an array assignment would make a copy first
+            self%group%node_force(i, 1, k) = self%forces%node(1, k)
+            self%group%node_force(i, 2, k) = self%forces%node(2, k)
+         end do
       end do
       self%group_is_current = .true.
    end subroutine load_lanes

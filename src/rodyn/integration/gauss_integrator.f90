@@ -63,6 +63,7 @@ module rodyn_gauss_integrator
       type(step_record) :: last, trial       !! the last accepted step, the one being tried
       real(wp), allocatable :: modal(:, :), reply(:, :) !! workspace (s, modes)
       real(wp), allocatable :: guess(:, :)   !! workspace (s, n_dof)
+      real(wp), allocatable :: node_state(:), node_rate(:) !! workspace: (q, p) at one node; rates of the quadratures
       real(wp), allocatable :: weight(:)     !! 1/tolerance of the rates (n_dof)
       real(wp), allocatable :: y(:), lost(:) !! state at t, and what rounding took from it (n_states)
       real(wp), allocatable :: y_before(:)   !! state at t_before
@@ -115,6 +116,7 @@ contains
       allocate (self%now, self%spare)
       associate (n => system%n_states, m => self%mechanics%n_dof)
          allocate (self%y(n), self%lost(n), self%y_before(n), self%increment(n), self%weight(m), self%guess(s, m), &
+                   self%node_state(2*m), self%node_rate(n - 2*m), &
                    source=0.0_wp)
          call allocate_record(self%last, m)
          call allocate_record(self%trial, m)
@@ -596,15 +598,17 @@ contains
       class(gauss_integrator), intent(inout) :: self
       real(wp), intent(in) :: t
       real(wp), intent(out) :: increment(:)
-      real(wp) :: rate(size(increment)), q(self%mechanics%n_dof), p(self%mechanics%n_dof)
       integer :: i
       increment = 0.0_wp
-      do i = 1, s
-         q = self%trial%q(i, :)
-         p = self%trial%p(i, :)
-         call self%mechanics%quadratures(t + self%now%h*self%rule%c(i), q, p, rate)
-         increment = increment + self%now%h*self%rule%b(i)*rate
-      end do
+      associate (m => self%mechanics%n_dof, q => self%node_state(:self%mechanics%n_dof), &
+                 p => self%node_state(self%mechanics%n_dof + 1:2*self%mechanics%n_dof), rate => self%node_rate)
+         do i = 1, s
+            self%node_state(:m) = self%trial%q(i, :)
+            self%node_state(m + 1:) = self%trial%p(i, :)
+            call self%mechanics%quadratures(t + self%now%h*self%rule%c(i), q, p, rate)
+            increment = increment + self%now%h*self%rule%b(i)*rate
+         end do
+      end associate
    end subroutine add_quadratures
 
    !> Make the trial the last step, and keep the digits that rounding takes from the state.
