@@ -124,7 +124,7 @@ contains
       call integrator%set_stop(t_end)
       call integrator%start(0.0_wp, y, error)
       if (.not. allocated(error)) call integrator%advance(t_end, y, t, error)
-      if (.not. allocated(error)) effort = effort_of(method, scene%n, integrator%statistics())
+      if (.not. allocated(error)) effort = effort_of(method, scene, integrator%statistics())
       call integrator%finalize()
    end function effort_of_run
 

@@ -54,7 +54,7 @@ SCENES = {
 }
 
 #: What `auto` takes for them, where it is not dop853.
-AUTO = dict.fromkeys(["flexible", "one rod", "fixed", "no ledger", "no loads, uncompressed"], "gauss")
+AUTO = dict.fromkeys(["flexible", "one rod", "one rigid rod, fixed", "fixed", "no ledger", "no loads, uncompressed"], "gauss")
 
 ROD_STATES = {"phi": "rad", "alpha": "rad", "beta": "rad", "phi_rate": "rad s-1", "alpha_rate": "rad s-1",
               "beta_rate": "rad s-1"}
@@ -348,7 +348,7 @@ def test_a_run_says_what_it_uses_and_what_it_skips(results, scene, uses, skips):
 @pytest.mark.parametrize("scene, sizes, method", [
     ("flexible", "3 rods (3 distinct kinds), 24 states; recursive kernel, O(n)", r"gauss: auto: frequencies .* rad/s, dampers"),
     ("one rod", "1 rod (1 distinct kind), 12 states; recursive kernel, O(n)", r"gauss: auto: frequencies .* about \d+ steps"),
-    ("one rigid rod, fixed", "1 rod (1 distinct kind), 2 states; recursive kernel, O(n)", r"dop853: auto: "),
+    ("one rigid rod, fixed", "1 rod (1 distinct kind), 2 states; recursive kernel, O(n)", r"gauss: auto: "),
     ("paper, bdf, assembled", "3 rods (3 distinct kinds), 24 states; assembled kernel, O(n^3)", "bdf: chosen by the case"),
     ("adams", "3 rods (3 distinct kinds), 24 states; recursive kernel, O(n)", "adams: chosen by the case"),
 ])

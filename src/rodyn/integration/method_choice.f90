@@ -2,8 +2,7 @@
 !>
 !> The measure is the time to the end of the run at the user's tolerances, by which all methods bring the chord angles to some
 !> ten times rtol or better (docs/performance.md, "Large and stiff"). Vibrations that the tolerances resolve must be followed
-!> by any method, and the cheapest steps win: collocation of order 16 for short chains of rods that bend, else explicit steps of
-!> order 8. Strong dampers, or rods so stiff that their vibrations drown
+!> by any method, and the cheapest steps win: collocation of order 16 for short chains, else explicit steps of order 8. Strong dampers, or rods so stiff that their vibrations drown
 !> in the tolerances, call for BDF. How much of a fast vibration is excited depends on loads and initial values, so where the
 !> fastest rates are far above those of the chain of rods, the methods are tried on the beginning of the run.
 module rodyn_method_choice
@@ -28,7 +27,7 @@ module rodyn_method_choice
    real(wp), parameter :: stability_limit = 6.0_wp !! step times decay rate that it bears
    real(wp), parameter :: stages = 12.0_wp         !! right-hand sides of its step
    real(wp), parameter :: iterations = 4.0_wp      !! of a collocation step
-   real(wp), parameter :: first_search = 60.0_wp   !! right-hand sides per rod that its first modes cost
+   real(wp), parameter :: first_search = 20.0_wp   !! right-hand sides per unknown that its first modes cost
    real(wp), parameter :: long_run = 5000.0_wp     !! right-hand sides of an explicit run that are worth a trial
    real(wp), parameter :: stiff_ratio = 200.0_wp   !! fastest rate over the chain's frequencies from where implicit steps may pay
    real(wp), parameter :: trial_share = 0.5_wp     !! of a run that follows all vibrations, spent on one candidate at most
@@ -95,10 +94,10 @@ contains
       real(wp) :: explicit_phase, radians
 
       collocation_is_cheaper = .false.
-      if (.not. scene%dynamic_bending .or. scene%assembled .or. decay > frequency) return
+      if (scene%assembled .or. scene%n_q > scene%n_dof .or. decay > frequency) return
       radians = frequency*t_end
       explicit_phase = vibration_limit*min(1.0_wp, (1.0e4_wp*options%rtol)**0.125_wp)
-      collocation_is_cheaper = first_search*scene%n + iterations*effort_of_nodes(scene%n)*radians/ &
+      collocation_is_cheaper = first_search*scene%n_dof + iterations*effort_of_nodes(scene)*radians/ &
                                collocation_phase(options%rtol) < (stages + 1.0_wp)*radians/explicit_phase
    end function collocation_is_cheaper
 
