@@ -2,9 +2,10 @@
 !>
 !> The measure is the time to the end of the run at the user's tolerances, by which all methods bring the chord angles to some
 !> ten times rtol or better (docs/performance.md, "Large and stiff"). Vibrations that the tolerances resolve must be followed
-!> by any method, and the cheapest steps win: collocation of order 16 for short chains, else explicit steps of order 8. Strong dampers, or rods so stiff that their vibrations drown
-!> in the tolerances, call for BDF. How much of a fast vibration is excited depends on loads and initial values, so where the
-!> fastest rates are far above those of the chain of rods, the methods are tried on the beginning of the run.
+!> by any method, and the cheapest steps win: collocation of order 16 for short chains, else explicit steps of order 8. Strong
+!> dampers, or rods so stiff that their vibrations drown in the tolerances, call for BDF. How much of a fast vibration is
+!> excited depends on loads and initial values, so where the fastest rates are far above those of the chain of rods, the
+!> methods are tried on the beginning of the run.
 module rodyn_method_choice
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: solver_config

@@ -26,7 +26,7 @@ module rodyn_method_trial
    integer, parameter :: n_even = 2 !! the first of them follow all vibrations, at a rather even pace; the very first is explicit
 
    real(wp), parameter :: first_effort = 400.0_wp     !! of a candidate, doubled from round to round
-   real(wp), parameter :: even_effort = 3000.0_wp     !! are enough to know the rather even pace of methods that follow all vibrations
+   real(wp), parameter :: even_effort = 3000.0_wp     !! are enough to know the pace of methods that follow all vibrations
    real(wp), parameter :: clear_lead = 4.0_wp         !! of an implicit method, with which the trial ends
 
    !> A run that can be continued.
