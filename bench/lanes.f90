@@ -2,15 +2,25 @@
 !> All figures of one run are measured in turns and ratios formed round by round, so that they hold on a noisy machine.
 !>
 !>     OPENBLAS_NUM_THREADS=1 fpm run --example bench_lanes --flag "$(tools/flags release)"   (with FPM_FC=mpifort)
-program bench_lanes
-   use, intrinsic :: iso_fortran_env, only: compiler_options
+module rodyn_lanes_bench
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type
    use rodyn_case_config, only: case_config
    use rodyn_lanes, only: lanes
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_motion, only: motion_type, new_motion, initial_state
+   use rodyn_case_config, only: load_config
+   use rodyn_ensemble, only: ensemble_client, ensemble_member, run_ensemble
+   use rodyn_integrator, only: integrator_type, solver_options
+   use rodyn_integrators, only: new_integrator
+   use rodyn_simulation, only: observer_type, simulate
    implicit none (type, external)
+   private
+   public :: kernels, cases
+
+   integer, parameter :: n_rounds = 31
+   integer, parameter :: n_cases = 64
+   integer, parameter :: case_rounds = 7
 
    !> One measured scene.
    type :: subject
@@ -21,14 +31,181 @@ program bench_lanes
       real(wp), allocatable :: one(:), many(:) !! per right-hand side (and lane), one a round [ns]
    end type subject
 
-   integer, parameter :: n_rounds = 31
+   !> A case of a sweep in a lane.
+   type, extends(ensemble_member) :: numbered
+      integer :: number = 0
+   end type numbered
+
+   !> Cases of a sweep over the mass of the nodes.
+   type, extends(ensemble_client) :: sweep_client
+      integer :: next = 0
+      type(solver_options) :: options
+      real(wp) :: phi(n_cases) = 0.0_wp !! of the last rod, at the end
+      integer(i8) :: n_rhs = 0
+   contains
+      procedure :: take
+      procedure :: observe
+      procedure :: finish
+   end type sweep_client
+
+   !> Keeps nothing.
+   type, extends(observer_type) :: nobody
+   contains
+      procedure :: observe => look_away
+   end type nobody
+
    integer, parameter :: chain_sizes(*) = [4, 16, 64]
    character(len=*), parameter :: kinds(*) = [character(len=24) :: 'dynamic', 'rigid', 'rigid, lumped', 'quasistatic, lumped']
 
-   write (*, '(2a)') 'compiler options: ', compiler_options()
-   call kernels()
-
 contains
+
+   !> Cases per second: table 1 for 1 s with 64 masses of the nodes, in lanes and one by one.
+   subroutine cases()
+      character(len=*), parameter :: methods(*) = [character(len=8) :: 'lanes', 'dop853', 'gauss']
+      real(wp), parameter :: rtols(*) = [1.0e-6_wp, 1.0e-9_wp]
+      real(wp) :: seconds(case_rounds, size(methods)), phi(n_cases, size(methods)), exact(n_cases)
+      integer(i8) :: n_rhs(size(methods))
+      integer :: i, j, round
+
+      call by_one('dop853', solver_options(rtol=1.0e-12_wp, atol=1.0e-14_wp), exact, n_rhs(1), seconds(1, 1))
+      write (*, '(/, a8, a10, 5a14)') 'rtol', 'method', 'cases/s', 'per dop853', 'error phi_4', 'rhs/case', 'ns/rhs'
+      do j = 1, size(rtols)
+         associate (options => solver_options(rtol=rtols(j), atol=0.01_wp*rtols(j)))
+            do round = 1, case_rounds
+               call by_lanes(options, phi(:, 1), n_rhs(1), seconds(round, 1))
+               call by_one('dop853', options, phi(:, 2), n_rhs(2), seconds(round, 2))
+               call by_one('gauss', options, phi(:, 3), n_rhs(3), seconds(round, 3))
+            end do
+         end associate
+         do i = 1, size(methods)
+            write (*, '(es8.0, a10, f14.1, f14.2, es14.1, i14, f14.1)') rtols(j), methods(i), n_cases/median(seconds(:, i)), &
+               median(seconds(:, 2)/seconds(:, i)), maxval(abs(phi(:, i) - exact)), n_rhs(i)/n_cases, &
+               1.0e9_wp*median(seconds(:, i))/n_rhs(i)
+         end do
+      end do
+   end subroutine cases
+
+   !> Case i of the sweep.
+   function swept(i) result(c)
+      integer, intent(in) :: i
+      type(case_config) :: c
+
+      c = standard(4, 'dynamic')
+      c%t_end = 1.0_wp
+      c%chain%hinge_stiffness(0) = 6000.0_wp
+      c%chain%hinge_damping(0) = 0.02_wp
+      c%chain%node_mass = 0.4_wp + 0.2_wp*real(i, wp)/n_cases
+      c%initial%phi = 0.0_wp
+      c%initial%phi_rate = 0.0_wp
+      c%initial%omega = 0.0_wp
+      deallocate (c%loads)
+      allocate (c%loads(3))
+      c%loads(1) = load_config(component='X', value=500.0_wp)
+      c%loads(2) = load_config(component='Y', value=500.0_wp)
+      c%loads(3) = load_config(component='M', value=1500.0_wp)
+   end function swept
+
+   subroutine by_lanes(options, phi, n_rhs, seconds)
+      type(solver_options), intent(in) :: options
+      real(wp), intent(out) :: phi(n_cases), seconds
+      integer(i8), intent(out) :: n_rhs
+      type(sweep_client) :: client
+      integer(i8) :: start, finish, rate
+
+      client%options = options
+      call system_clock(start, rate)
+      call run_ensemble(client)
+      call system_clock(finish)
+      seconds = real(finish - start, wp)/real(rate, wp)
+      phi = client%phi
+      n_rhs = client%n_rhs
+   end subroutine by_lanes
+
+   subroutine by_one(method, options, phi, n_rhs, seconds)
+      character(len=*), intent(in) :: method
+      type(solver_options), intent(in) :: options
+      real(wp), intent(out) :: phi(n_cases), seconds
+      integer(i8), intent(out) :: n_rhs
+      type(motion_type), target :: motion
+      class(integrator_type), allocatable :: integrator
+      type(scene_type) :: scene
+      type(error_type), allocatable :: error
+      type(nobody) :: observer
+      real(wp), allocatable :: y(:)
+      real(wp) :: t
+      integer(i8) :: start, finish, rate
+      integer :: i
+
+      n_rhs = 0
+      call system_clock(start, rate)
+      do i = 1, n_cases
+         call new_scene(scene, swept(i), error)
+         if (.not. allocated(error)) call new_motion(motion, scene, .false., error)
+         if (.not. allocated(error)) call new_integrator(integrator, motion, method, options, error)
+         if (allocated(error)) error stop error%message
+         allocate (y(motion%n_states), source=0.0_wp)
+         call simulate(motion, integrator, [1.0_wp], 1.0_wp, observer, y, t, error)
+         if (allocated(error)) error stop error%message
+         phi(i) = y(7)
+         associate (counts => integrator%statistics())
+            n_rhs = n_rhs + counts%n_rhs
+         end associate
+         call integrator%finalize()
+         deallocate (y, integrator)
+      end do
+      call system_clock(finish)
+      seconds = real(finish - start, wp)/real(rate, wp)
+   end subroutine by_one
+
+   subroutine take(self, member)
+      class(sweep_client), intent(inout) :: self
+      class(ensemble_member), pointer, intent(out) :: member
+      type(numbered), pointer :: mine
+      type(scene_type) :: scene
+      type(error_type), allocatable :: error
+
+      nullify (member)
+      if (self%next == n_cases) return
+      self%next = self%next + 1
+      allocate (mine)
+      mine%number = self%next
+      call new_scene(scene, swept(mine%number), error)
+      if (.not. allocated(error)) call new_motion(mine%motion, scene, .false., error)
+      if (allocated(error)) error stop error%message
+      allocate (mine%y(mine%motion%n_states), source=0.0_wp)
+      mine%times = [1.0_wp]
+      mine%t_end = 1.0_wp
+      mine%options = self%options
+      member => mine
+   end subroutine take
+
+   subroutine observe(self, member, t, y, error)
+      class(sweep_client), intent(inout) :: self
+      class(ensemble_member), intent(inout) :: member
+      real(wp), intent(in) :: t, y(:)
+      type(error_type), allocatable, intent(out) :: error
+      associate (unused => t, unused_error => error); end associate
+      select type (member)
+      type is (numbered)
+         self%phi(member%number) = y(7)
+      end select
+   end subroutine observe
+
+   subroutine finish(self, member)
+      class(sweep_client), intent(inout) :: self
+      class(ensemble_member), pointer, intent(inout) :: member
+      if (allocated(member%error)) error stop member%error%message
+      self%n_rhs = self%n_rhs + member%counts%n_rhs
+      deallocate (member)
+   end subroutine finish
+
+   subroutine look_away(self, motion, t, y, error)
+      class(nobody), intent(inout) :: self
+      type(motion_type), intent(in) :: motion
+      real(wp), intent(in) :: t, y(:)
+      type(error_type), allocatable, intent(out) :: error
+      associate (unused => self, unused_motion => motion, unused_t => t, unused_y => y, unused_error => error); end associate
+   end subroutine look_away
 
    !> Time of a right-hand side.
    subroutine kernels()
@@ -165,4 +342,13 @@ contains
       median = sorted((size(x) + 1)/2)
    end function median
 
+end module rodyn_lanes_bench
+
+program bench_lanes
+   use, intrinsic :: iso_fortran_env, only: compiler_options
+   use rodyn_lanes_bench, only: kernels, cases
+   implicit none (type, external)
+   write (*, '(2a)') 'compiler options: ', compiler_options()
+   call kernels()
+   call cases()
 end program bench_lanes

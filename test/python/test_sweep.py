@@ -187,6 +187,46 @@ def test_a_case_over_its_wall_limit_fails_alone_and_can_be_retried(here):
     np.testing.assert_allclose(data.phi[0, 0], data.phi[1, 0], rtol=0, atol=1e-6)  # the last step ends at t_end
 
 
+LANES = """&sweep base = 'base.nml', probe_times = 0.02, 0.05, keep_series = .true. /
+&axis key = 'mass_ratio', start = 0.5, stop = 8, count = 11, spacing = 'log' /
+&axis key = 'model.inertia', text_values = 'distributed', 'lumped' /
+"""
+
+
+def test_like_cases_go_in_lanes_with_the_same_bytes_in_any_company(here):
+    result = sweep(here, LANES)
+    assert "side by side in 8 lanes" in result.stdout
+    data = opened(here)
+    assert "8 lanes" in data.attrs["lanes"] and list(data.status) == ["done"] * 22
+    for shard in range(1, 12):
+        sweep(here, LANES, "--shard", f"{shard}/11", name="shards")  # two cases each
+    assert content(here / "s") == content(here / "shards")
+
+
+def test_lanes_agree_with_one_by_one_and_can_be_switched_off(here):
+    sweep(here, LANES)
+    alone = LANES.replace("&sweep", "&sweep lanes = .false.,")
+    assert "lanes   one by one" in sweep(here, alone, name="alone").stdout
+    data, other = opened(here), opened(here, "alone")
+    assert other.attrs["lanes"] == "one by one"
+    np.testing.assert_allclose(data.phi, other.phi, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(data.series_alpha, other.series_alpha, rtol=0, atol=1e-7)
+    refused = sweep(here, alone, name="s", code=2)  # another plan
+    assert "lanes" in refused.stderr
+
+
+def test_a_case_that_fails_in_a_lane_disturbs_no_other(here):
+    axis = "&axis key = 'solver.max_steps', values = {} /\n"
+    head = "&sweep base = 'base.nml', probe_times = 0.05 /\n"
+    sweep(here, head + axis.format("1001, 1002, 1003, 1004, 1005, 1006, 1007, 1008, 1009, 1010"), name="good")
+    sweep(here, head + axis.format("1001, 1002, 1003, 3, 1005, 1006, 1007, 1008, 1009, 1010"), code=1)
+    good, data = opened(here, "good"), opened(here)
+    assert list(data.status[:5]) == ["done", "done", "done", "failed", "done"]
+    others = [i for i in range(10) if i != 3]
+    np.testing.assert_array_equal(data.phi[others], good.phi[others])
+    np.testing.assert_array_equal(data.n_rhs[others], good.n_rhs[others])
+
+
 def test_running_again_computes_nothing(here):
     sweep(here, GRID)
     before = (here / "s" / "sweep.h5").read_bytes()

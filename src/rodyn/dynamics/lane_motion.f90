@@ -19,13 +19,12 @@ module rodyn_lane_motion
    end type lane_load
 
    type, extends(lane_system) :: lane_motion
-      integer :: n_dof = 0
       type(lane_scene) :: group
       type(lane_work) :: work
       type(lane_load) :: loads(lanes)
       logical :: varying = .false. !! in some lane
    contains
-      procedure :: rhs
+      procedure :: accelerations
       procedure :: put
       procedure :: set_regime
       procedure :: release
@@ -39,7 +38,7 @@ contains
       type(scene_type), intent(in) :: scene
 
       motion%n_dof = scene%n_dof
-      motion%n_states = 2*scene%n_dof
+      motion%turning = scene%n_base > 0
       call new_lane_scene(motion%group, scene, one_rod_each=.true.)
       call new_lane_work(motion%work, motion%group)
       motion%group%loaded = any(scene%loads%loads%target == 'node')
@@ -88,12 +87,12 @@ contains
       end associate
    end subroutine write_forces
 
-   !> y' = (q', p'). The displacement of C is measured along the turning axes, MODEL sec. 1.
-   subroutine rhs(self, t, y, ydot, ok)
+   !> p' in every lane.
+   subroutine accelerations(self, t, q, p, acceleration, ok)
       class(lane_motion), intent(inout) :: self
       real(wp), intent(in) :: t(lanes)
-      real(wp), contiguous, intent(in) :: y(:, :)
-      real(wp), contiguous, intent(out) :: ydot(:, :)
+      real(wp), contiguous, intent(in) :: q(:, :), p(:, :)
+      real(wp), contiguous, intent(out) :: acceleration(:, :)
       logical, intent(out) :: ok(lanes)
       integer :: i
 
@@ -104,29 +103,7 @@ contains
             call write_forces(self, i)
          end do
       end if
-      associate (m => self%n_dof)
-         call group_accelerations(self%group, self%work, y(:, :m), y(:, m + 1:), ydot(:, m + 1:), ok)
-         call coordinate_rates(m, self%group%n_base > 0, y(:, :m), y(:, m + 1:), ydot(:, :m))
-      end associate
-   end subroutine rhs
-
-   pure subroutine coordinate_rates(m, turning, q, p, rate)
-      integer, intent(in) :: m
-      logical, intent(in) :: turning
-      real(wp), intent(in) :: q(lanes, m), p(lanes, m)
-      real(wp), intent(out) :: rate(lanes, m)
-      integer :: i, first
-
-      first = 1
-      if (turning) then
-         first = 3
-         !$omp simd
-         do i = 1, lanes
-            rate(i, 1) = p(i, 1) + p(i, 3)*q(i, 2)
-            rate(i, 2) = p(i, 2) - p(i, 3)*q(i, 1)
-         end do
-      end if
-      rate(:, first:) = p(:, first:)
-   end subroutine coordinate_rates
+      call group_accelerations(self%group, self%work, q, p, acceleration, ok)
+   end subroutine accelerations
 
 end module rodyn_lane_motion

@@ -105,7 +105,7 @@ contains
       if (.not. associated(first)) return
       call new_lane_motion(ensemble%motion, first%motion%dynamics%scene)
       call new_lane_dop853(ensemble%integrator, ensemble%motion)
-      allocate (ensemble%y(ensemble%motion%n_states))
+      allocate (ensemble%y(2*ensemble%motion%n_dof))
       call system_clock(ensemble%clock)
       call seat_member(ensemble, client, 1, first)
       do

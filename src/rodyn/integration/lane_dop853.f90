@@ -24,12 +24,7 @@ module rodyn_lane_dop853
    use rodyn_lane_ode, only: lane_system
    use rodyn_integrator, only: solver_options, solver_statistics, time_text
    use rodyn_text, only: to_text
-   use rodyn_dop853_tableau, only: c2, c3, c4, c5, c6, c7, c8, c9, c10, c11, c12, a2_1, a3_1, a3_2, a4_1, &
-      a4_3, a5_1, a5_3, a5_4, a6_1, a6_4, a6_5, a7_1, a7_4, a7_5, a7_6, a8_1, a8_4, a8_5, a8_6, a8_7, a9_1, &
-      a9_4, a9_5, a9_6, a9_7, a9_8, a10_1, a10_4, a10_5, a10_6, a10_7, a10_8, a10_9, a11_1, a11_4, a11_5, &
-      a11_6, a11_7, a11_8, a11_9, a11_10, a12_1, a12_4, a12_5, a12_6, a12_7, a12_8, a12_9, a12_10, a12_11, &
-      b1, b6, b7, b8, b9, b10, b11, b12, e5_1, e5_6, e5_7, e5_8, e5_9, e5_10, e5_11, e5_12, e3_1, e3_6, e3_7, &
-      e3_8, e3_9, e3_10, e3_11, e3_12
+   use rodyn_dop853_nystrom, only: n_stages, node, a, a2, b, b2, e5, e5_2, e3, e3_2
    implicit none (type, external)
    private
    public :: lane_dop853, new_lane_dop853, suits_lane_dop853
@@ -41,8 +36,6 @@ module rodyn_lane_dop853
    integer, parameter :: at_failure = 3 !! no way on
 
    integer, parameter :: idle = 0, stepping = 1, on_side_trip = 2 !! what a lane does in a pass
-   integer, parameter :: n_stages = 12
-   real(wp), parameter :: node(n_stages) = [0.0_wp, c2, c3, c4, c5, c6, c7, c8, c9, c10, c11, c12]
    real(wp), parameter :: safety = 0.9_wp, shrink = 1.0_wp/3.0_wp, grow = 6.0_wp ! Hairer's
    real(wp), parameter :: hopeless = 1.0e300_wp !! error norm of a step that came to nothing
 
@@ -67,14 +60,16 @@ module rodyn_lane_dop853
    type :: lane_dop853
       private
       class(lane_system), pointer :: system => null() !! not owned
-      integer :: n = 0                           !! states
+      integer :: m = 0                           !! length of q and p
+      integer :: n_turning = 0                   !! q(1:2) turn
       type(lane_course) :: course(lanes)
       real(wp), dimension(lanes) :: h = 0.0_wp, rtol = 1.0e-8_wp, atol = 1.0e-8_wp !! step of the pass [s]; tolerances
-      real(wp), allocatable :: y(:, :)           !! states where the pass starts (lanes, n)
-      real(wp), allocatable :: k(:, :, :)        !! rates of the stages, the first there (lanes, n, 12)
-      real(wp), allocatable :: lost(:, :)        !! what rounding took from the state so far (lanes, n)
-      real(wp), dimension(:, :), allocatable :: stage, increment, y_new, f_new !! workspace (lanes, n)
-      real(wp), dimension(:, :), allocatable :: y_after, f_after !! end of the last step, of lanes on side trips (lanes, n)
+      real(wp), dimension(:, :), allocatable :: q, p !! where the pass starts (lanes, m)
+      real(wp), allocatable :: f(:, :, :)        !! accelerations of the stages, the first there (lanes, m, 12)
+      real(wp), allocatable :: turn(:, :, :)     !! rates of q(1:2) (lanes, 2, 12)
+      real(wp), dimension(:, :), allocatable :: q_lost, p_lost !! what rounding took from q and p so far (lanes, m)
+      real(wp), dimension(:, :), allocatable :: q_stage, p_stage, q_increment, p_increment, q_new, p_new, f_new !! workspace
+      real(wp), dimension(:, :), allocatable :: q_after, p_after, f_after !! end of the last step, of lanes on side trips
    contains
       procedure :: enter
       procedure :: restart
@@ -102,11 +97,14 @@ contains
       class(lane_system), target, intent(inout) :: system
 
       self%system => system
-      self%n = system%n_states
-      associate (n => self%n)
-         allocate (self%y(lanes, n), self%k(lanes, n, n_stages), self%lost(lanes, n), self%stage(lanes, n), &
-                   self%increment(lanes, n), self%y_new(lanes, n), self%f_new(lanes, n), self%y_after(lanes, n), &
-                   self%f_after(lanes, n), source=0.0_wp)
+      self%m = system%n_dof
+      if (system%turning) self%n_turning = 2
+      associate (m => self%m)
+         allocate (self%f(lanes, m, n_stages), self%turn(lanes, 2, n_stages), source=0.0_wp)
+         allocate (self%q(lanes, m), self%p(lanes, m), self%q_lost(lanes, m), self%p_lost(lanes, m), self%q_stage(lanes, m), &
+                   self%p_stage(lanes, m), self%q_increment(lanes, m), self%p_increment(lanes, m), self%q_new(lanes, m), &
+                   self%p_new(lanes, m), self%f_new(lanes, m), self%q_after(lanes, m), self%p_after(lanes, m), &
+                   self%f_after(lanes, m), source=0.0_wp)
       end associate
    end subroutine new_lane_dop853
 
@@ -116,7 +114,7 @@ contains
       integer, intent(in) :: lane
       type(solver_options), intent(in) :: options !! rtol, atol, max_step and max_steps are used
       real(wp), intent(in) :: t        !! [s]
-      real(wp), intent(in) :: y(:)     !! (n_states)
+      real(wp), intent(in) :: y(:)     !! (2 m)
       real(wp), intent(in) :: t_stop   !! end of the first interval [s]
       real(wp), intent(in) :: t_wanted !! next output, after t and not after t_stop; huge: none [s]
 
@@ -127,12 +125,15 @@ contains
          course%t = t
          self%rtol(lane) = options%rtol
          self%atol(lane) = options%atol
-         self%lost(lane, :) = 0.0_wp
+         self%q_lost(lane, :) = 0.0_wp
+         self%p_lost(lane, :) = 0.0_wp
+         self%q(lane, :) = 0.0_wp
+         self%p(lane, :) = 0.0_wp
          if (all(abs(y) <= huge(y))) then
-            self%y(lane, :) = y
+            self%q(lane, :) = y(:self%m)
+            self%p(lane, :) = y(self%m + 1:)
             call self%restart(lane, t_stop, t_wanted)
          else
-            self%y(lane, :) = 0.0_wp
             call fail(self, lane, 'start at t = '//time_text(t)//' s: the initial state is not finite')
          end if
       end associate
@@ -159,12 +160,12 @@ contains
          course%t_wanted = t_wanted
          course%rejected = .false.
          course%counts%n_starts = course%counts%n_starts + 1
-         call evaluate_one(self, lane, course%t, self%y, ok)
+         call evaluate_one(self, lane, course%t, self%q, self%p, ok)
          if (.not. ok) then
             call fail(self, lane, 'dop853 at t = '//time_text(course%t)//' s: '//trouble(course))
             return
          end if
-         self%k(lane, :, 1) = self%f_new(lane, :)
+         self%f(lane, :, 1) = self%f_new(lane, :)
          call first_step(self, lane)
       end associate
    end subroutine restart
@@ -206,14 +207,14 @@ contains
    subroutine state(self, lane, y)
       class(lane_dop853), intent(in) :: self
       integer, intent(in) :: lane
-      real(wp), intent(out) :: y(:) !! (n_states)
+      real(wp), intent(out) :: y(:) !! (2 m)
       associate (course => self%course(lane))
          if (course%doing /= on_side_trip) then
-            y = self%y(lane, :)
+            y = [self%q(lane, :), self%p(lane, :)]
          else if (course%event == at_output) then
-            y = self%y(lane, :) + self%increment(lane, :)
+            y = [self%q(lane, :) + self%q_increment(lane, :), self%p(lane, :) + self%p_increment(lane, :)]
          else
-            y = self%y_after(lane, :)
+            y = [self%q_after(lane, :), self%p_after(lane, :)]
          end if
       end associate
    end subroutine state
@@ -245,20 +246,26 @@ contains
          call choose_end(self, lane)
       end do
       good = .true.
+      if (self%n_turning > 0) call turning_rates(self%m, self%q, self%p, self%turn(:, :, 1))
       do s = 2, n_stages
-         call stage_state(s, self%n, self%y, self%h, self%k, self%stage)
+         call stage_states(s, self%m, self%h, self%q, self%p, self%f, self%q_stage, self%p_stage)
+         if (self%n_turning > 0) call turning_stage(s, self%m, self%h, self%q, self%turn, self%q_stage)
          t = self%course%t_base + node(s)*self%h
-         call self%system%rhs(t, self%stage, self%k(:, :, s), ok)
+         call self%system%accelerations(t, self%q_stage, self%p_stage, self%f(:, :, s), ok)
+         if (self%n_turning > 0) call turning_rates(self%m, self%q_stage, self%p_stage, self%turn(:, :, s))
          good = good .and. ok
       end do
-      call add_increment(self%n, self%h, self%k, self%y, self%lost, self%rtol, self%atol, self%increment, self%y_new, norm)
+      call end_of_step(self%m, self%n_turning, self%h, self%q, self%p, self%f, self%turn, self%q_lost, self%p_lost, self%rtol, &
+                       self%atol, self%q_increment, self%p_increment, self%q_new, self%p_new, norm)
       t = self%course%t_new
-      call self%system%rhs(t, self%y_new, self%f_new, ok)
-      call check_rates(self%n, self%f_new, ok)
+      call self%system%accelerations(t, self%q_new, self%p_new, self%f_new, ok)
+      call check_rates(self%m, self%f_new, ok)
       do lane = 1, lanes
          call judge(self, lane, good(lane), ok(lane), norm(lane), commit(lane), move(lane))
       end do
-      call advance_states(self%n, commit, move, self%y_new, self%increment, self%f_new, self%lost, self%y, self%k)
+      call advance_states(self%m, commit, move, self%q_new, self%q_increment, self%q_lost, self%q)
+      call advance_states(self%m, commit, move, self%p_new, self%p_increment, self%p_lost, self%p)
+      call advance_rates(self%m, move, self%f_new, self%f(:, :, 1))
       do lane = 1, lanes
          if (self%course(lane)%doing == on_side_trip .and. commit(lane) > 0.5_wp) call keep_end(self, lane)
       end do
@@ -371,8 +378,9 @@ contains
          course%event = at_nothing
          if (course%t_wanted < course%t) return
          if (course%doing == on_side_trip) then
-            self%y(lane, :) = self%y_after(lane, :)
-            self%k(lane, :, 1) = self%f_after(lane, :)
+            self%q(lane, :) = self%q_after(lane, :)
+            self%p(lane, :) = self%p_after(lane, :)
+            self%f(lane, :, 1) = self%f_after(lane, :)
             course%doing = stepping
             course%t_base = course%t
          end if
@@ -385,7 +393,8 @@ contains
    subroutine keep_end(self, lane)
       class(lane_dop853), intent(inout) :: self
       integer, intent(in) :: lane
-      self%y_after(lane, :) = self%y_new(lane, :)
+      self%q_after(lane, :) = self%q_new(lane, :)
+      self%p_after(lane, :) = self%p_new(lane, :)
       self%f_after(lane, :) = self%f_new(lane, :)
    end subroutine keep_end
 
@@ -396,12 +405,15 @@ contains
       character(len=*), intent(in) :: text
 
       associate (course => self%course(lane))
-         if (course%doing == on_side_trip) self%y(lane, :) = self%y_after(lane, :)
+         if (course%doing == on_side_trip) then
+            self%q(lane, :) = self%q_after(lane, :)
+            self%p(lane, :) = self%p_after(lane, :)
+         end if
          course%doing = idle
          course%event = at_failure
          course%failure = text
       end associate
-      self%k(lane, :, :) = 0.0_wp ! what follows in this lane is thrown away, but should be harmless
+      self%f(lane, :, :) = 0.0_wp ! what follows in this lane is thrown away, but should be harmless
       self%h(lane) = 0.0_wp
    end subroutine fail
 
@@ -416,19 +428,19 @@ contains
       end if
    end function trouble
 
-   !> Rates of one lane, in `f_new`. The others are computed, too, and not used.
-   subroutine evaluate_one(self, lane, t, y, ok)
+   !> Accelerations of one lane, in `f_new`. The others are computed, too, and not used.
+   subroutine evaluate_one(self, lane, t, q, p, ok)
       class(lane_dop853), intent(inout) :: self
       integer, intent(in) :: lane
       real(wp), intent(in) :: t
-      real(wp), contiguous, intent(in) :: y(:, :)
+      real(wp), contiguous, intent(in) :: q(:, :), p(:, :)
       logical, intent(out) :: ok
       real(wp) :: times(lanes)
       logical :: all_ok(lanes)
 
       times = self%course%t_base
       times(lane) = t
-      call self%system%rhs(times, y, self%f_new, all_ok)
+      call self%system%accelerations(times, q, p, self%f_new, all_ok)
       self%course(lane)%counts%n_rhs = self%course(lane)%counts%n_rhs + 1
       ok = all_ok(lane)
       self%course(lane)%refused = .not. ok
@@ -439,181 +451,379 @@ contains
    subroutine first_step(self, lane)
       class(lane_dop853), intent(inout) :: self
       integer, intent(in) :: lane
-      real(wp) :: d0, d1, d2, h0, h1, scale(self%n)
+      real(wp) :: d0, d1, d2, h0, h1, root
+      real(wp), dimension(2*self%m) :: y, f, f_ahead, scale
       logical :: ok
 
-      associate (n => self%n, course => self%course(lane), y => self%y(lane, :), f => self%k(lane, :, 1), &
-                 options => self%course(lane)%options)
-         associate (span => course%t_stop - course%t)
-            if (span <= 0.0_wp) return
-            scale = options%atol + options%rtol*abs(y)
-            d0 = norm2(y/scale)/sqrt(real(n, wp))
-            d1 = norm2(f/scale)/sqrt(real(n, wp))
-            h0 = 1.0e-6_wp
-            if (min(d0, d1) > 1.0e-5_wp) h0 = 0.01_wp*d0/d1
-            h0 = min(h0, span)
-            self%stage = self%y
-            self%stage(lane, :) = y + h0*f
-            call evaluate_one(self, lane, course%t + h0, self%stage, ok)
-            if (ok) then
-               d2 = norm2((self%f_new(lane, :) - f)/scale)/sqrt(real(n, wp))/h0
-               if (max(d1, d2) <= 1.0e-15_wp) then
-                  h1 = max(1.0e-6_wp, 1.0e-3_wp*h0)
-               else
-                  h1 = (0.01_wp/max(d1, d2))**0.125_wp
-               end if
-               course%h_next = min(100.0_wp*h0, h1, span)
+      root = sqrt(real(2*self%m, wp))
+      associate (m => self%m, course => self%course(lane), options => self%course(lane)%options)
+         if (course%t_stop <= course%t) return
+         call all_rates(self, self%q, self%p, self%f(:, :, 1), lane, f)
+         y = [self%q(lane, :), self%p(lane, :)]
+         scale = options%atol + options%rtol*abs(y)
+         d0 = norm2(y/scale)/root
+         d1 = norm2(f/scale)/root
+         h0 = 1.0e-6_wp
+         if (min(d0, d1) > 1.0e-5_wp) h0 = 0.01_wp*d0/d1
+         h0 = min(h0, course%t_stop - course%t)
+         self%q_stage = self%q
+         self%p_stage = self%p
+         self%q_stage(lane, :) = y(:m) + h0*f(:m)
+         self%p_stage(lane, :) = y(m + 1:) + h0*f(m + 1:)
+         call evaluate_one(self, lane, course%t + h0, self%q_stage, self%p_stage, ok)
+         if (ok) then
+            call all_rates(self, self%q_stage, self%p_stage, self%f_new, lane, f_ahead)
+            d2 = norm2((f_ahead - f)/scale)/root/h0
+            if (max(d1, d2) <= 1.0e-15_wp) then
+               h1 = max(1.0e-6_wp, 1.0e-3_wp*h0)
             else
-               course%h_next = 1.0e-3_wp*h0
+               h1 = (0.01_wp/max(d1, d2))**0.125_wp
             end if
-            if (options%max_step > 0.0_wp) course%h_next = min(course%h_next, options%max_step)
-            if (.not. course%h_next > 0.0_wp) &
-               call fail(self, lane, 'dop853 at t = '//time_text(course%t)//' s: no first step found')
-         end associate
+            course%h_next = min(100.0_wp*h0, h1, course%t_stop - course%t)
+         else
+            course%h_next = 1.0e-3_wp*h0
+         end if
+         if (options%max_step > 0.0_wp) course%h_next = min(course%h_next, options%max_step)
+         if (.not. course%h_next > 0.0_wp) &
+            call fail(self, lane, 'dop853 at t = '//time_text(course%t)//' s: no first step found')
       end associate
    end subroutine first_step
 
+   !> (q', p') of one lane.
+   pure subroutine all_rates(self, q, p, f, lane, rates)
+      class(lane_dop853), intent(in) :: self
+      real(wp), dimension(lanes, self%m), intent(in) :: q, p, f
+      integer, intent(in) :: lane
+      real(wp), intent(out) :: rates(2*self%m)
+
+      rates = [p(lane, :), f(lane, :)]
+      if (self%n_turning == 0) return
+      rates(1) = rates(1) + p(lane, 3)*q(lane, 2)
+      rates(2) = rates(2) - p(lane, 3)*q(lane, 1)
+   end subroutine all_rates
+
+   !> q(1:2)' of a free spacecraft.
+   pure subroutine turning_rates(m, q, p, rate)
+      integer, intent(in) :: m
+      real(wp), intent(in) :: q(lanes, m), p(lanes, m)
+      real(wp), intent(out) :: rate(lanes, 2)
+      integer :: l
+      !$omp simd
+      do l = 1, lanes
+         rate(l, 1) = p(l, 1) + p(l, 3)*q(l, 2)
+         rate(l, 2) = p(l, 2) - p(l, 3)*q(l, 1)
+      end do
+   end subroutine turning_rates
+
    !> State of stage s.
-   pure subroutine stage_state(s, n, y, h, k, stage)
+   pure subroutine stage_states(s, m, h, q, p, f, q_stage, p_stage)
       integer, intent(in) :: s !! 2..12
-      integer, intent(in) :: n
-      real(wp), intent(in) :: y(lanes, n), h(lanes), k(lanes, n, n_stages)
-      real(wp), intent(out) :: stage(lanes, n)
+      integer, intent(in) :: m
+      real(wp), intent(in) :: h(lanes), q(lanes, m), p(lanes, m), f(lanes, m, n_stages)
+      real(wp), intent(out) :: q_stage(lanes, m), p_stage(lanes, m)
       integer :: j, l
 
       select case (s)
       case (2)
-         do j = 1, n
+         do j = 1, m
             !$omp simd
             do l = 1, lanes
-               stage(l, j) = y(l, j) + h(l)*(a2_1*k(l, j, 1))
+               p_stage(l, j) = p(l, j) + h(l)*(a(1, 2)*f(l, j, 1))
+               q_stage(l, j) = q(l, j) + h(l)*(node(2)*p(l, j))
             end do
          end do
       case (3)
-         do j = 1, n
+         do j = 1, m
             !$omp simd
             do l = 1, lanes
-               stage(l, j) = y(l, j) + h(l)*(a3_1*k(l, j, 1) + a3_2*k(l, j, 2))
+               p_stage(l, j) = p(l, j) + h(l)*(a(1, 3)*f(l, j, 1) + a(2, 3)*f(l, j, 2))
+               q_stage(l, j) = q(l, j) + h(l)*(node(3)*p(l, j) + h(l)*(a2(1, 3)*f(l, j, 1)))
             end do
          end do
       case (4)
-         do j = 1, n
+         do j = 1, m
             !$omp simd
             do l = 1, lanes
-               stage(l, j) = y(l, j) + h(l)*(a4_1*k(l, j, 1) + a4_3*k(l, j, 3))
+               p_stage(l, j) = p(l, j) + h(l)*(a(1, 4)*f(l, j, 1) + a(3, 4)*f(l, j, 3))
+               q_stage(l, j) = q(l, j) + h(l)*(node(4)*p(l, j) + h(l)*(a2(1, 4)*f(l, j, 1) + a2(2, 4)*f(l, j, 2)))
             end do
          end do
       case (5)
-         do j = 1, n
+         do j = 1, m
             !$omp simd
             do l = 1, lanes
-               stage(l, j) = y(l, j) + h(l)*(a5_1*k(l, j, 1) + a5_3*k(l, j, 3) + a5_4*k(l, j, 4))
+               p_stage(l, j) = p(l, j) + h(l)*(a(1, 5)*f(l, j, 1) + a(3, 5)*f(l, j, 3) + a(4, 5)*f(l, j, 4))
+               q_stage(l, j) = q(l, j) + h(l)*(node(5)*p(l, j) + h(l)*(a2(1, 5)*f(l, j, 1) + a2(2, 5)*f(l, j, 2) + &
+                                                                       a2(3, 5)*f(l, j, 3)))
             end do
          end do
       case (6)
-         do j = 1, n
+         do j = 1, m
             !$omp simd
             do l = 1, lanes
-               stage(l, j) = y(l, j) + h(l)*(a6_1*k(l, j, 1) + a6_4*k(l, j, 4) + a6_5*k(l, j, 5))
+               p_stage(l, j) = p(l, j) + h(l)*(a(1, 6)*f(l, j, 1) + a(4, 6)*f(l, j, 4) + a(5, 6)*f(l, j, 5))
+               q_stage(l, j) = q(l, j) + h(l)*(node(6)*p(l, j) + h(l)*(a2(1, 6)*f(l, j, 1) + a2(3, 6)*f(l, j, 3) + &
+                                                                       a2(4, 6)*f(l, j, 4)))
             end do
          end do
       case (7)
-         do j = 1, n
+         do j = 1, m
             !$omp simd
             do l = 1, lanes
-               stage(l, j) = y(l, j) + h(l)*(a7_1*k(l, j, 1) + a7_4*k(l, j, 4) + a7_5*k(l, j, 5) + a7_6*k(l, j, 6))
+               p_stage(l, j) = p(l, j) + h(l)*(a(1, 7)*f(l, j, 1) + a(4, 7)*f(l, j, 4) + a(5, 7)*f(l, j, 5) + &
+                                               a(6, 7)*f(l, j, 6))
+               q_stage(l, j) = q(l, j) + h(l)*(node(7)*p(l, j) + h(l)*(a2(1, 7)*f(l, j, 1) + a2(3, 7)*f(l, j, 3) + &
+                                                                       a2(4, 7)*f(l, j, 4) + a2(5, 7)*f(l, j, 5)))
             end do
          end do
       case (8)
-         do j = 1, n
+         do j = 1, m
             !$omp simd
             do l = 1, lanes
-               stage(l, j) = y(l, j) + h(l)*(a8_1*k(l, j, 1) + a8_4*k(l, j, 4) + a8_5*k(l, j, 5) + a8_6*k(l, j, 6) + &
-                                             a8_7*k(l, j, 7))
+               p_stage(l, j) = p(l, j) + h(l)*(a(1, 8)*f(l, j, 1) + a(4, 8)*f(l, j, 4) + a(5, 8)*f(l, j, 5) + &
+                                               a(6, 8)*f(l, j, 6) + a(7, 8)*f(l, j, 7))
+               q_stage(l, j) = q(l, j) + h(l)*(node(8)*p(l, j) + h(l)*(a2(1, 8)*f(l, j, 1) + a2(3, 8)*f(l, j, 3) + &
+                                                                       a2(4, 8)*f(l, j, 4) + a2(5, 8)*f(l, j, 5) + &
+                                                                       a2(6, 8)*f(l, j, 6)))
             end do
          end do
       case (9)
-         do j = 1, n
+         do j = 1, m
             !$omp simd
             do l = 1, lanes
-               stage(l, j) = y(l, j) + h(l)*(a9_1*k(l, j, 1) + a9_4*k(l, j, 4) + a9_5*k(l, j, 5) + a9_6*k(l, j, 6) + &
-                                             a9_7*k(l, j, 7) + a9_8*k(l, j, 8))
+               p_stage(l, j) = p(l, j) + h(l)*(a(1, 9)*f(l, j, 1) + a(4, 9)*f(l, j, 4) + a(5, 9)*f(l, j, 5) + &
+                                               a(6, 9)*f(l, j, 6) + a(7, 9)*f(l, j, 7) + a(8, 9)*f(l, j, 8))
+               q_stage(l, j) = q(l, j) + h(l)*(node(9)*p(l, j) + h(l)*(a2(1, 9)*f(l, j, 1) + a2(3, 9)*f(l, j, 3) + &
+                                                                       a2(4, 9)*f(l, j, 4) + a2(5, 9)*f(l, j, 5) + &
+                                                                       a2(6, 9)*f(l, j, 6) + a2(7, 9)*f(l, j, 7)))
             end do
          end do
       case (10)
-         do j = 1, n
+         do j = 1, m
             !$omp simd
             do l = 1, lanes
-               stage(l, j) = y(l, j) + h(l)*(a10_1*k(l, j, 1) + a10_4*k(l, j, 4) + a10_5*k(l, j, 5) + a10_6*k(l, j, 6) + &
-                                             a10_7*k(l, j, 7) + a10_8*k(l, j, 8) + a10_9*k(l, j, 9))
+               p_stage(l, j) = p(l, j) + h(l)*(a(1, 10)*f(l, j, 1) + a(4, 10)*f(l, j, 4) + a(5, 10)*f(l, j, 5) + &
+                                               a(6, 10)*f(l, j, 6) + a(7, 10)*f(l, j, 7) + a(8, 10)*f(l, j, 8) + &
+                                               a(9, 10)*f(l, j, 9))
+               q_stage(l, j) = q(l, j) + h(l)*(node(10)*p(l, j) + h(l)*(a2(1, 10)*f(l, j, 1) + a2(3, 10)*f(l, j, 3) + &
+                                                                        a2(4, 10)*f(l, j, 4) + a2(5, 10)*f(l, j, 5) + &
+                                                                        a2(6, 10)*f(l, j, 6) + a2(7, 10)*f(l, j, 7) + &
+                                                                        a2(8, 10)*f(l, j, 8)))
             end do
          end do
       case (11)
-         do j = 1, n
+         do j = 1, m
             !$omp simd
             do l = 1, lanes
-               stage(l, j) = y(l, j) + h(l)*(a11_1*k(l, j, 1) + a11_4*k(l, j, 4) + a11_5*k(l, j, 5) + a11_6*k(l, j, 6) + &
-                                             a11_7*k(l, j, 7) + a11_8*k(l, j, 8) + a11_9*k(l, j, 9) + a11_10*k(l, j, 10))
+               p_stage(l, j) = p(l, j) + h(l)*(a(1, 11)*f(l, j, 1) + a(4, 11)*f(l, j, 4) + a(5, 11)*f(l, j, 5) + &
+                                               a(6, 11)*f(l, j, 6) + a(7, 11)*f(l, j, 7) + a(8, 11)*f(l, j, 8) + &
+                                               a(9, 11)*f(l, j, 9) + a(10, 11)*f(l, j, 10))
+               q_stage(l, j) = q(l, j) + h(l)*(node(11)*p(l, j) + h(l)*(a2(1, 11)*f(l, j, 1) + a2(3, 11)*f(l, j, 3) + &
+                                                                        a2(4, 11)*f(l, j, 4) + a2(5, 11)*f(l, j, 5) + &
+                                                                        a2(6, 11)*f(l, j, 6) + a2(7, 11)*f(l, j, 7) + &
+                                                                        a2(8, 11)*f(l, j, 8) + a2(9, 11)*f(l, j, 9)))
             end do
          end do
       case default ! 12
-         do j = 1, n
+         do j = 1, m
             !$omp simd
             do l = 1, lanes
-               stage(l, j) = y(l, j) + h(l)*(a12_1*k(l, j, 1) + a12_4*k(l, j, 4) + a12_5*k(l, j, 5) + a12_6*k(l, j, 6) + &
-                                             a12_7*k(l, j, 7) + a12_8*k(l, j, 8) + a12_9*k(l, j, 9) + a12_10*k(l, j, 10) + &
-                                             a12_11*k(l, j, 11))
+               p_stage(l, j) = p(l, j) + h(l)*(a(1, 12)*f(l, j, 1) + a(4, 12)*f(l, j, 4) + a(5, 12)*f(l, j, 5) + &
+                                               a(6, 12)*f(l, j, 6) + a(7, 12)*f(l, j, 7) + a(8, 12)*f(l, j, 8) + &
+                                               a(9, 12)*f(l, j, 9) + a(10, 12)*f(l, j, 10) + a(11, 12)*f(l, j, 11))
+               q_stage(l, j) = q(l, j) + h(l)*(node(12)*p(l, j) + h(l)*(a2(1, 12)*f(l, j, 1) + a2(3, 12)*f(l, j, 3) + &
+                                                                        a2(4, 12)*f(l, j, 4) + a2(5, 12)*f(l, j, 5) + &
+                                                                        a2(6, 12)*f(l, j, 6) + a2(7, 12)*f(l, j, 7) + &
+                                                                        a2(8, 12)*f(l, j, 8) + a2(9, 12)*f(l, j, 9) + &
+                                                                        a2(10, 12)*f(l, j, 10)))
             end do
          end do
       end select
-   end subroutine stage_state
+   end subroutine stage_states
 
-   !> h sum b_i k_i, the new state, and the norm of its error: root mean square of error/tolerance, Hairer's mix of the
-   !> two estimates. Anything that is not finite makes it `hopeless`.
-   pure subroutine add_increment(n, h, k, y, lost, rtol, atol, increment, y_new, norm)
-      integer, intent(in) :: n
-      real(wp), intent(in) :: h(lanes), k(lanes, n, n_stages), y(lanes, n), lost(lanes, n), rtol(lanes), atol(lanes)
-      real(wp), intent(out) :: increment(lanes, n), y_new(lanes, n), norm(lanes)
-      real(wp) :: sum_5(lanes), sum_3(lanes), bad(lanes), weight, e5, e3, both
+   !> The same of q(1:2), where they turn.
+   pure subroutine turning_stage(s, m, h, q, turn, q_stage)
+      integer, intent(in) :: s !! 2..12
+      integer, intent(in) :: m
+      real(wp), intent(in) :: h(lanes), q(lanes, m), turn(lanes, 2, n_stages)
+      real(wp), intent(inout) :: q_stage(lanes, m)
+      integer :: j, l
+
+      select case (s)
+      case (2)
+         do j = 1, 2
+            !$omp simd
+            do l = 1, lanes
+               q_stage(l, j) = q(l, j) + h(l)*(a(1, 2)*turn(l, j, 1))
+            end do
+         end do
+      case (3)
+         do j = 1, 2
+            !$omp simd
+            do l = 1, lanes
+               q_stage(l, j) = q(l, j) + h(l)*(a(1, 3)*turn(l, j, 1) + a(2, 3)*turn(l, j, 2))
+            end do
+         end do
+      case (4)
+         do j = 1, 2
+            !$omp simd
+            do l = 1, lanes
+               q_stage(l, j) = q(l, j) + h(l)*(a(1, 4)*turn(l, j, 1) + a(3, 4)*turn(l, j, 3))
+            end do
+         end do
+      case (5)
+         do j = 1, 2
+            !$omp simd
+            do l = 1, lanes
+               q_stage(l, j) = q(l, j) + h(l)*(a(1, 5)*turn(l, j, 1) + a(3, 5)*turn(l, j, 3) + a(4, 5)*turn(l, j, 4))
+            end do
+         end do
+      case (6)
+         do j = 1, 2
+            !$omp simd
+            do l = 1, lanes
+               q_stage(l, j) = q(l, j) + h(l)*(a(1, 6)*turn(l, j, 1) + a(4, 6)*turn(l, j, 4) + a(5, 6)*turn(l, j, 5))
+            end do
+         end do
+      case (7)
+         do j = 1, 2
+            !$omp simd
+            do l = 1, lanes
+               q_stage(l, j) = q(l, j) + h(l)*(a(1, 7)*turn(l, j, 1) + a(4, 7)*turn(l, j, 4) + a(5, 7)*turn(l, j, 5) + &
+                                               a(6, 7)*turn(l, j, 6))
+            end do
+         end do
+      case (8)
+         do j = 1, 2
+            !$omp simd
+            do l = 1, lanes
+               q_stage(l, j) = q(l, j) + h(l)*(a(1, 8)*turn(l, j, 1) + a(4, 8)*turn(l, j, 4) + a(5, 8)*turn(l, j, 5) + &
+                                               a(6, 8)*turn(l, j, 6) + a(7, 8)*turn(l, j, 7))
+            end do
+         end do
+      case (9)
+         do j = 1, 2
+            !$omp simd
+            do l = 1, lanes
+               q_stage(l, j) = q(l, j) + h(l)*(a(1, 9)*turn(l, j, 1) + a(4, 9)*turn(l, j, 4) + a(5, 9)*turn(l, j, 5) + &
+                                               a(6, 9)*turn(l, j, 6) + a(7, 9)*turn(l, j, 7) + a(8, 9)*turn(l, j, 8))
+            end do
+         end do
+      case (10)
+         do j = 1, 2
+            !$omp simd
+            do l = 1, lanes
+               q_stage(l, j) = q(l, j) + h(l)*(a(1, 10)*turn(l, j, 1) + a(4, 10)*turn(l, j, 4) + a(5, 10)*turn(l, j, 5) + &
+                                               a(6, 10)*turn(l, j, 6) + a(7, 10)*turn(l, j, 7) + a(8, 10)*turn(l, j, 8) + &
+                                               a(9, 10)*turn(l, j, 9))
+            end do
+         end do
+      case (11)
+         do j = 1, 2
+            !$omp simd
+            do l = 1, lanes
+               q_stage(l, j) = q(l, j) + h(l)*(a(1, 11)*turn(l, j, 1) + a(4, 11)*turn(l, j, 4) + a(5, 11)*turn(l, j, 5) + &
+                                               a(6, 11)*turn(l, j, 6) + a(7, 11)*turn(l, j, 7) + a(8, 11)*turn(l, j, 8) + &
+                                               a(9, 11)*turn(l, j, 9) + a(10, 11)*turn(l, j, 10))
+            end do
+         end do
+      case default ! 12
+         do j = 1, 2
+            !$omp simd
+            do l = 1, lanes
+               q_stage(l, j) = q(l, j) + h(l)*(a(1, 12)*turn(l, j, 1) + a(4, 12)*turn(l, j, 4) + a(5, 12)*turn(l, j, 5) + &
+                                               a(6, 12)*turn(l, j, 6) + a(7, 12)*turn(l, j, 7) + a(8, 12)*turn(l, j, 8) + &
+                                               a(9, 12)*turn(l, j, 9) + a(10, 12)*turn(l, j, 10) + a(11, 12)*turn(l, j, 11))
+            end do
+         end do
+      end select
+   end subroutine turning_stage
+
+   !> Increments, the new state, and the norm of its error: root mean square of error/tolerance, Hairer's mix of the two
+   !> estimates. Anything that is not finite makes it `hopeless`.
+   pure subroutine end_of_step(m, n_turning, h, q, p, f, turn, q_lost, p_lost, rtol, atol, q_increment, p_increment, q_new, &
+                               p_new, norm)
+      integer, intent(in) :: m, n_turning
+      real(wp), intent(in) :: h(lanes), f(lanes, m, n_stages), turn(lanes, 2, n_stages), rtol(lanes), atol(lanes)
+      real(wp), dimension(lanes, m), intent(in) :: q, p, q_lost, p_lost
+      real(wp), dimension(lanes, m), intent(out) :: q_increment, p_increment, q_new, p_new
+      real(wp), intent(out) :: norm(lanes)
+      real(wp), dimension(lanes) :: sum_5, sum_3, bad
+      real(wp) :: rate, five, three, weight, both
       integer :: j, l
 
       sum_5 = 0.0_wp
       sum_3 = 0.0_wp
       bad = 0.0_wp
-      do j = 1, n
+      do j = 1, m
          !$omp simd
          do l = 1, lanes
-            increment(l, j) = h(l)*(b1*k(l, j, 1) + b6*k(l, j, 6) + b7*k(l, j, 7) + b8*k(l, j, 8) + b9*k(l, j, 9) + &
-                                    b10*k(l, j, 10) + b11*k(l, j, 11) + b12*k(l, j, 12))
-            y_new(l, j) = y(l, j) + (increment(l, j) - lost(l, j))
-            weight = 1.0_wp/(atol(l) + rtol(l)*max(abs(y(l, j)), abs(y_new(l, j))))
-            e5 = e5_1*k(l, j, 1) + e5_6*k(l, j, 6) + e5_7*k(l, j, 7) + e5_8*k(l, j, 8) + e5_9*k(l, j, 9) + &
-                 e5_10*k(l, j, 10) + e5_11*k(l, j, 11) + e5_12*k(l, j, 12)
-            e3 = e3_1*k(l, j, 1) + e3_6*k(l, j, 6) + e3_7*k(l, j, 7) + e3_8*k(l, j, 8) + e3_9*k(l, j, 9) + &
-                 e3_10*k(l, j, 10) + e3_11*k(l, j, 11) + e3_12*k(l, j, 12)
-            sum_5(l) = sum_5(l) + (e5*weight)**2
-            sum_3(l) = sum_3(l) + (e3*weight)**2
-            bad(l) = merge(bad(l), 1.0_wp, abs(y_new(l, j)) <= huge(1.0_wp))
+            rate = b(1)*f(l, j, 1) + b(6)*f(l, j, 6) + b(7)*f(l, j, 7) + b(8)*f(l, j, 8) + b(9)*f(l, j, 9) + &
+                   b(10)*f(l, j, 10) + b(11)*f(l, j, 11) + b(12)*f(l, j, 12)
+            five = e5(1)*f(l, j, 1) + e5(6)*f(l, j, 6) + e5(7)*f(l, j, 7) + e5(8)*f(l, j, 8) + e5(9)*f(l, j, 9) + &
+                   e5(10)*f(l, j, 10) + e5(11)*f(l, j, 11) + e5(12)*f(l, j, 12)
+            three = e3(1)*f(l, j, 1) + e3(6)*f(l, j, 6) + e3(7)*f(l, j, 7) + e3(8)*f(l, j, 8) + e3(9)*f(l, j, 9) + &
+                    e3(10)*f(l, j, 10) + e3(11)*f(l, j, 11) + e3(12)*f(l, j, 12)
+            p_increment(l, j) = h(l)*rate
+            p_new(l, j) = p(l, j) + (p_increment(l, j) - p_lost(l, j))
+            weight = 1.0_wp/(atol(l) + rtol(l)*max(abs(p(l, j)), abs(p_new(l, j))))
+            sum_5(l) = sum_5(l) + (five*weight)**2
+            sum_3(l) = sum_3(l) + (three*weight)**2
+            bad(l) = merge(bad(l), 1.0_wp, abs(p_new(l, j)) <= huge(1.0_wp))
+         end do
+      end do
+      do j = 1, n_turning
+         !$omp simd
+         do l = 1, lanes
+            rate = b(1)*turn(l, j, 1) + b(6)*turn(l, j, 6) + b(7)*turn(l, j, 7) + b(8)*turn(l, j, 8) + b(9)*turn(l, j, 9) + &
+                   b(10)*turn(l, j, 10) + b(11)*turn(l, j, 11) + b(12)*turn(l, j, 12)
+            five = e5(1)*turn(l, j, 1) + e5(6)*turn(l, j, 6) + e5(7)*turn(l, j, 7) + e5(8)*turn(l, j, 8) + &
+                   e5(9)*turn(l, j, 9) + e5(10)*turn(l, j, 10) + e5(11)*turn(l, j, 11) + e5(12)*turn(l, j, 12)
+            three = e3(1)*turn(l, j, 1) + e3(6)*turn(l, j, 6) + e3(7)*turn(l, j, 7) + e3(8)*turn(l, j, 8) + &
+                    e3(9)*turn(l, j, 9) + e3(10)*turn(l, j, 10) + e3(11)*turn(l, j, 11) + e3(12)*turn(l, j, 12)
+            q_increment(l, j) = h(l)*rate
+            q_new(l, j) = q(l, j) + (q_increment(l, j) - q_lost(l, j))
+            weight = 1.0_wp/(atol(l) + rtol(l)*max(abs(q(l, j)), abs(q_new(l, j))))
+            sum_5(l) = sum_5(l) + (five*weight)**2
+            sum_3(l) = sum_3(l) + (three*weight)**2
+            bad(l) = merge(bad(l), 1.0_wp, abs(q_new(l, j)) <= huge(1.0_wp))
+         end do
+      end do
+      do j = n_turning + 1, m
+         !$omp simd
+         do l = 1, lanes
+            rate = p(l, j) + h(l)*(b2(1)*f(l, j, 1) + b2(6)*f(l, j, 6) + b2(7)*f(l, j, 7) + b2(8)*f(l, j, 8) + &
+                   b2(9)*f(l, j, 9) + b2(10)*f(l, j, 10) + b2(11)*f(l, j, 11))
+            five = h(l)*(e5_2(1)*f(l, j, 1) + e5_2(4)*f(l, j, 4) + e5_2(5)*f(l, j, 5) + e5_2(6)*f(l, j, 6) + &
+                   e5_2(7)*f(l, j, 7) + e5_2(8)*f(l, j, 8) + e5_2(9)*f(l, j, 9) + e5_2(10)*f(l, j, 10) + e5_2(11)*f(l, j, 11))
+            three = h(l)*(e3_2(1)*f(l, j, 1) + e3_2(4)*f(l, j, 4) + e3_2(5)*f(l, j, 5) + e3_2(6)*f(l, j, 6) + &
+                    e3_2(7)*f(l, j, 7) + e3_2(8)*f(l, j, 8) + e3_2(9)*f(l, j, 9) + e3_2(10)*f(l, j, 10) + e3_2(11)*f(l, j, 11))
+            q_increment(l, j) = h(l)*rate
+            q_new(l, j) = q(l, j) + (q_increment(l, j) - q_lost(l, j))
+            weight = 1.0_wp/(atol(l) + rtol(l)*max(abs(q(l, j)), abs(q_new(l, j))))
+            sum_5(l) = sum_5(l) + (five*weight)**2
+            sum_3(l) = sum_3(l) + (three*weight)**2
+            bad(l) = merge(bad(l), 1.0_wp, abs(q_new(l, j)) <= huge(1.0_wp))
          end do
       end do
       !$omp simd
       do l = 1, lanes
-         both = n*(sum_5(l) + 0.01_wp*sum_3(l))
+         both = 2*m*(sum_5(l) + 0.01_wp*sum_3(l))
          norm(l) = abs(h(l))*sum_5(l)/sqrt(max(both, tiny(1.0_wp)))
          norm(l) = merge(norm(l), hopeless, both <= huge(1.0_wp) .and. norm(l) <= huge(1.0_wp) .and. bad(l) < 0.5_wp)
       end do
-   end subroutine add_increment
+   end subroutine end_of_step
 
    !> Not ok where some rate is not finite.
-   pure subroutine check_rates(n, f, ok)
-      integer, intent(in) :: n
-      real(wp), intent(in) :: f(lanes, n)
+   pure subroutine check_rates(m, f, ok)
+      integer, intent(in) :: m
+      real(wp), intent(in) :: f(lanes, m)
       logical, intent(inout) :: ok(lanes)
       real(wp) :: bad(lanes)
       integer :: j, l
 
       bad = 0.0_wp
-      do j = 1, n
+      do j = 1, m
          !$omp simd
          do l = 1, lanes
             bad(l) = merge(bad(l), 1.0_wp, abs(f(l, j)) <= huge(1.0_wp))
@@ -623,22 +833,34 @@ contains
    end subroutine check_rates
 
    !> Make the new states the current ones where steps were accepted, with the digits that rounding took from them.
-   pure subroutine advance_states(n, commit, move, y_new, increment, f_new, lost, y, k)
-      integer, intent(in) :: n
+   pure subroutine advance_states(m, commit, move, y_new, increment, lost, y)
+      integer, intent(in) :: m
       real(wp), intent(in) :: commit(lanes), move(lanes)
-      real(wp), dimension(lanes, n), intent(in) :: y_new, increment, f_new
-      real(wp), dimension(lanes, n), intent(inout) :: lost, y
-      real(wp), intent(inout) :: k(lanes, n, n_stages)
+      real(wp), dimension(lanes, m), intent(in) :: y_new, increment
+      real(wp), dimension(lanes, m), intent(inout) :: lost, y
       integer :: j, l
 
-      do j = 1, n
+      do j = 1, m
          !$omp simd
          do l = 1, lanes
             lost(l, j) = merge((y_new(l, j) - y(l, j)) - (increment(l, j) - lost(l, j)), lost(l, j), commit(l) > 0.5_wp)
             y(l, j) = merge(y_new(l, j), y(l, j), move(l) > 0.5_wp)
-            k(l, j, 1) = merge(f_new(l, j), k(l, j, 1), move(l) > 0.5_wp)
          end do
       end do
    end subroutine advance_states
+
+   pure subroutine advance_rates(m, move, f_new, f)
+      integer, intent(in) :: m
+      real(wp), intent(in) :: move(lanes), f_new(lanes, m)
+      real(wp), intent(inout) :: f(lanes, m)
+      integer :: j, l
+
+      do j = 1, m
+         !$omp simd
+         do l = 1, lanes
+            f(l, j) = merge(f_new(l, j), f(l, j), move(l) > 0.5_wp)
+         end do
+      end do
+   end subroutine advance_rates
 
 end module rodyn_lane_dop853
