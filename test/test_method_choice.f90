@@ -102,7 +102,7 @@ contains
       if (chosen > 0.0_wp .and. chosen <= 1.5_wp*minval(effort)) return
       write (text, '("EI times ", es8.1, ", D times ", es8.1, ", rtol = ", es8.1, ": ", a, " of ", *(es9.2))') bending, dampers, &
          tolerance, choice%method, effort
-      call raise(error, trim(text)//'; '//choice%reason)
+      call raise(error, trim(text)//'; '//choice%reason())
    end subroutine compare
 
    real(wp) function effort_of_run(scene, method, options) result(effort)

@@ -11,6 +11,7 @@ module rodyn_fastest_rates
    public :: fastest_rates, with_rigid_rods
 
    integer, parameter :: n_iterations = 40
+   real(wp), parameter :: small_change = 1.0e-2_wp !! of the growth; three such in sequence end the iteration
    real(wp), parameter :: step = 1.0e-5_wp !! change of the coordinates for derivatives [rad]
 
 contains
@@ -20,23 +21,25 @@ contains
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: q(:)           !! coordinates (n_q)
       real(wp), intent(out) :: frequency     !! highest natural frequency [rad/s]
-      real(wp), intent(out) :: decay         !! fastest decay if nothing but the dampers acted [1/s]
+      real(wp), intent(out), optional :: decay !! fastest decay if nothing but the dampers acted [1/s]
       type(dynamics_type) :: dynamics
       type(error_type), allocatable :: error
-      real(wp) :: x(scene%n_dof), image(scene%n_dof), growth(2)
-      integer :: which, i, k
+      real(wp) :: x(scene%n_dof), image(scene%n_dof), growth(2), before
+      integer :: which, i, k, steady
       logical :: ok
 
       frequency = 0.0_wp
-      decay = 0.0_wp
+      if (present(decay)) decay = 0.0_wp
       growth = 0.0_wp
       call new_dynamics(dynamics, scene, error)
       if (allocated(error)) return
-      do which = 1, merge(2, 1, scene%hinges%has_damping)
+      do which = 1, merge(2, 1, scene%hinges%has_damping .and. present(decay))
          x = [(cos(2.4_wp*real(k, wp)**2), k=1, scene%n_dof)] ! something of everything
          if (scene%n_base > 0) x(1:3) = 0.0_wp
+         steady = 0
          do i = 1, n_iterations
             x = x/norm2(x)
+            before = growth(which)
             if (which == 1) then
                call by_springs(dynamics, q, x, image, ok)
             else
@@ -46,10 +49,12 @@ contains
             growth(which) = norm2(image)
             if (.not. growth(which) > tiny(1.0_wp)) exit
             x = image
+            steady = merge(steady + 1, 0, abs(growth(which) - before) < small_change*growth(which))
+            if (steady == 3) exit
          end do
       end do
       frequency = sqrt(growth(1))
-      decay = max(growth(2), scene%hinges%fastest_relaxation())
+      if (present(decay)) decay = max(growth(2), scene%hinges%fastest_relaxation())
    end subroutine fastest_rates
 
    !> The scene without the bending of its rods: what is left of its spectrum are the slow motions of the chain. Scenes

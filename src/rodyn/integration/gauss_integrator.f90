@@ -35,6 +35,10 @@ module rodyn_gauss_integrator
    real(wp), parameter :: smallest_phase = 0.2_wp  !! slower vibrations need no implicit treatment
    real(wp), parameter :: search_cost = 1.5_wp      !! finding modes, in iterations per unknown
 
+   ! The numbers of the method, made once: a sweep has thousands of integrators.
+   type(gauss_collocation), save :: made_rule
+   logical, save :: rule_is_made = .false.
+
    !> The matrices of one step length.
    type :: step_matrices
       real(wp) :: h = 0.0_wp                 !! step [s]
@@ -112,7 +116,9 @@ contains
       end if
       self%system => system
       self%options = options
-      call new_gauss_collocation(self%rule)
+      if (.not. rule_is_made) call new_gauss_collocation(made_rule)
+      rule_is_made = .true.
+      self%rule = made_rule
       allocate (self%now, self%spare)
       associate (n => system%n_states, m => self%mechanics%n_dof)
          allocate (self%y(n), self%lost(n), self%y_before(n), self%increment(n), self%weight(m), self%guess(s, m), &

@@ -19,9 +19,16 @@ module rodyn_method_choice
 
    type :: method_choice
       character(len=:), allocatable :: method !! name of an integrator
-      character(len=:), allocatable :: reason !! in words
       type(solver_options) :: options         !! the user's, with the order that was chosen
+      logical :: automatic = .false.          !! `auto` chose
+      logical :: tried = .false.              !! after a trial
       real(wp) :: effort = 0.0_wp             !! of the trial, in right-hand sides
+      real(wp) :: frequency = 0.0_wp          !! highest natural frequency [rad/s]
+      real(wp) :: decay = 0.0_wp              !! fastest decay [1/s]
+      real(wp) :: steps = 0.0_wp              !! forecast
+      real(wp) :: advantage = 1.0_wp          !! over explicit steps, by the trial
+   contains
+      procedure :: reason
    end type method_choice
 
    real(wp), parameter :: vibration_limit = 3.0_wp !! step times frequency that order 8 takes
@@ -44,47 +51,58 @@ contains
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: y(:)  !! state at t = 0, without quadratures
       real(wp), intent(in) :: t_end !! [s]
-      real(wp) :: frequency, decay, slow, unused, explicit, forecast(size(candidates))
+      real(wp) :: slow, explicit, forecast(size(candidates))
       integer :: best
 
       choice%method = trim(solver%method)
-      choice%reason = 'chosen by the case'
       choice%options = options
-      if (solver%method /= 'auto') return
+      choice%automatic = solver%method == 'auto'
+      if (.not. choice%automatic) return
       choice%method = 'dop853'
-      call fastest_rates(scene, y(:scene%n_q), frequency, decay)
-      choice%reason = 'auto: frequencies to '//short(frequency)//' rad/s'
-      if (.not. frequency > 0.0_wp) choice%reason = 'auto: no vibrations'
-      if (decay > 0.0_wp) choice%reason = choice%reason//', dampers to '//short(decay)//' 1/s'
-      explicit = stages*t_end*max(frequency/vibration_limit, decay/stability_limit)
-      call fastest_rates(with_rigid_rods(scene), y(:scene%n_base + scene%n + scene%n_q - scene%n_dof), slow, unused)
-      if (explicit < long_run .or. max(frequency, decay) < stiff_ratio*slow) then
-         if (collocation_is_cheaper(scene, options, frequency, decay, t_end)) then
-            choice%method = 'gauss'
-            choice%reason = choice%reason//': collocation, order 16, about '// &
-                            whole(t_end*frequency/collocation_phase(options%rtol))//' steps'
-         else
-            choice%reason = choice%reason//': explicit, order 8, about '//whole(explicit/stages)//' steps'
-         end if
+      call fastest_rates(scene, y(:scene%n_q), choice%frequency, choice%decay)
+      explicit = stages*t_end*max(choice%frequency/vibration_limit, choice%decay/stability_limit)
+      choice%steps = explicit/stages
+      slow = 0.0_wp
+      if (explicit >= long_run) &
+         call fastest_rates(with_rigid_rods(scene), y(:scene%n_base + scene%n + scene%n_q - scene%n_dof), slow)
+      if (explicit < long_run .or. max(choice%frequency, choice%decay) < stiff_ratio*slow) then
+         if (.not. collocation_is_cheaper(scene, options, choice%frequency, choice%decay, t_end)) return
+         choice%method = 'gauss'
+         choice%steps = t_end*choice%frequency/collocation_phase(options%rtol)
          return
       end if
       call try_methods(scene, y, options, minval([t_end, pack(scene%loads%switches, scene%loads%switches > 0.0_wp)]), t_end, &
                        trial_share, forecast, choice%effort)
       forecast(:2) = forecast(:2)/lead ! dop853, gauss
       best = minloc(forecast, dim=1)
+      choice%tried = .true.
       choice%method = trim(candidates(best)%method)
       choice%options%order = candidates(best)%order
-      if (best == 1) then
-         choice%reason = choice%reason//': explicit, order 8, about '//whole(explicit/stages)//' steps'
-      else if (choice%method == 'gauss') then
-         choice%reason = choice%reason//': collocation, order 16, in a trial the fastest'
-      else
-         choice%reason = choice%reason//': stiff, implicit, '
-         if (candidates(best)%order > 0) choice%reason = choice%reason//'order '//whole(real(candidates(best)%order, wp))//', '
-         choice%reason = choice%reason//'in a trial '//short(min(forecast(1)*lead/forecast(best), 1.0e9_wp))// &
-            ' times as fast as explicit'
-      end if
+      choice%advantage = min(forecast(1)*lead/forecast(best), 1.0e9_wp)
    end subroutine choose_method
+
+   !> Why this method, in words.
+   function reason(self) result(text)
+      class(method_choice), intent(in) :: self
+      character(len=:), allocatable :: text
+
+      text = 'chosen by the case'
+      if (.not. self%automatic) return
+      text = 'auto: no vibrations'
+      if (self%frequency > 0.0_wp) text = 'auto: frequencies to '//short(self%frequency)//' rad/s'
+      if (self%decay > 0.0_wp) text = text//', dampers to '//short(self%decay)//' 1/s'
+      if (self%method == 'dop853') then
+         text = text//': explicit, order 8, about '//whole(self%steps)//' steps'
+      else if (self%method == 'gauss') then
+         text = text//': collocation, order 16, '
+         if (self%tried) text = text//'in a trial the fastest'
+         if (.not. self%tried) text = text//'about '//whole(self%steps)//' steps'
+      else
+         text = text//': stiff, implicit, '
+         if (self%options%order > 0) text = text//'order '//whole(real(self%options%order, wp))//', '
+         text = text//'in a trial '//short(self%advantage)//' times as fast as explicit'
+      end if
+   end function reason
 
    !> Collocation against order 8, by what a unit of phase of the fastest vibration costs at the user's tolerance. The phases of
    !> their steps are those of table 1 (docs/performance.md); they change little from scene to scene.

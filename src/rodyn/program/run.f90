@@ -75,7 +75,7 @@ contains
       header%notes = notes_on(scene, y(:scene%n_dof), config%output%ledger)
       if (.not. silent) then
          write (output_unit, '(a)') describe_scene(scene, config%output%ledger)
-         write (output_unit, '(a)') 'method  '//choice%method//': '//choice%reason
+         write (output_unit, '(a)') 'method  '//choice%method//': '//choice%reason()
          call print_notes(header%notes)
       end if
       call new_integrator(integrator, motion, choice%method, choice%options, error)
@@ -162,7 +162,7 @@ contains
 
       stats = integrator%statistics()
       report%method = choice%method
-      report%reason = choice%reason
+      report%reason = choice%reason()
       report%kernel = trim(merge('assembled', 'recursive', scene%assembled))
       report%order = config%solver%order
       report%rtol = config%solver%rtol

@@ -135,6 +135,28 @@ contains
       integer, intent(in) :: rows(:) !! (dimensions)
       type(case_config), intent(out) :: config
       type(error_type), allocatable, intent(out) :: error
+      integer :: a
+
+      if (all([(is_ratio(sweep%axes(a)), a=1, size(sweep%axes))])) then
+         config = sweep%base_case ! nothing to read anew
+      else
+         call read_values(sweep, rows, config, error)
+         if (allocated(error)) return
+      end if
+      do a = 1, size(sweep%axes)
+         associate (axis => sweep%axes(a), chain => config%chain)
+            if (is_ratio(axis)) chain%node_mass(:) = axis%numbers(rows(axis%dimension))* &
+               sum(chain%length*chain%mass_per_length)/chain%n_rods
+         end associate
+      end do
+   end subroutine build_values
+
+   !> The same without mass ratios: keys of the base case set anew, and all read and checked.
+   subroutine read_values(sweep, rows, config, error)
+      type(sweep_config), intent(in) :: sweep
+      integer, intent(in) :: rows(:) !! (dimensions)
+      type(case_config), intent(out) :: config
+      type(error_type), allocatable, intent(out) :: error
       type(namelist_document) :: document
       integer :: a
 
@@ -150,14 +172,7 @@ contains
          end associate
       end do
       call case_from_document(document, config, error)
-      if (allocated(error)) return
-      do a = 1, size(sweep%axes)
-         associate (axis => sweep%axes(a), chain => config%chain)
-            if (is_ratio(axis)) chain%node_mass(:) = axis%numbers(rows(axis%dimension))* &
-               sum(chain%length*chain%mass_per_length)/chain%n_rods
-         end associate
-      end do
-   end subroutine build_values
+   end subroutine read_values
 
    !> Rods without inertia cannot swing by themselves: where an axis changes the inertia and none the bending,
    !> 'dynamic' becomes 'quasistatic' for lumped mass, and the reverse for distributed mass.

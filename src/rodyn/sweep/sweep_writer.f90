@@ -25,7 +25,7 @@ module rodyn_sweep_writer
    ! How long a result may wait to be synced: a loss of power in this time costs it. Short at first, and in long sweeps 5 %
    ! of the time so far up to 2 s, so that a thousand processes do not sync thousands of times each second. Cases that take
    ! longer are synced at once.
-   real(wp), parameter :: shortest_wait = 0.25_wp, longest_wait = 2.0_wp, share_of_time = 0.05_wp ! [s], [s], 1
+   real(wp), parameter :: shortest_wait = 1.0_wp, longest_wait = 2.0_wp, share_of_time = 0.05_wp ! [s], [s], 1
    integer, parameter :: large_enough = 1024*1024 !! words of a shard: 8 MiB
 
    type :: shard_writer
