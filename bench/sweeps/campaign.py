@@ -90,7 +90,7 @@ class Campaign:
         for name in ("SIGTERM", "SIGUSR1"):
             directory = self.scratch.path(name.lower())
             process = subprocess.Popen(command("fast500.nml", directory, "--quiet"), stderr=subprocess.PIPE)
-            time.sleep(0.4)
+            time.sleep(0.2)
             process.send_signal(getattr(signal, name))
             start = time.monotonic()
             process.communicate()

@@ -36,8 +36,8 @@ module rodyn_gauss_integrator
    real(wp), parameter :: search_cost = 1.5_wp      !! finding modes, in iterations per unknown
 
    ! The numbers of the method, made once: a sweep has thousands of integrators.
-   type(gauss_collocation), save :: made_rule
-   logical, save :: rule_is_made = .false.
+   type(gauss_collocation) :: made_rule
+   logical :: rule_is_made = .false.
 
    !> The matrices of one step length.
    type :: step_matrices
