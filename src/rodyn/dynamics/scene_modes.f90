@@ -108,7 +108,7 @@ contains
    pure subroutine diagonalise(smallest, h, x, y)
       real(wp), intent(in) :: smallest !! diagonal elements below it need no precision
       real(wp), contiguous, intent(inout) :: h(:, :), x(:, :), y(:, :)
-      real(wp), parameter :: negligible = 1.0e-3_wp !! off the diagonal, of the smaller element on it
+      real(wp), parameter :: negligible = 1.0e-5_wp !! off the diagonal, of the smaller element on it
       integer, parameter :: most_sweeps = 12
       real(wp) :: theta, t, c, s
       integer :: sweep, i, j

@@ -20,8 +20,8 @@ module rodyn_gauss_integrator
    use rodyn_ode, only: ode_system, mechanical_system, stiff_modes
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, time_text
    use rodyn_trigonometry, only: sine_cosine
-   use rodyn_lane_algebra, only: apply, apply_one, apply_both, project, expand, combine, square_sums, straight_lines, &
-      subtract, add
+   use rodyn_lane_algebra, only: apply, apply_one, apply_both, multiply, project, project_pair, expand, combine, square_sums, &
+      straight_lines, residual, add, accumulate, copy
    use rodyn_gauss_collocation, only: gauss_collocation, new_gauss_collocation
    implicit none (type, external)
    private
@@ -32,7 +32,7 @@ module rodyn_gauss_integrator
    real(wp), parameter :: error_constant = 0.5_wp   !! of the error estimate, see `error_estimate`
    real(wp), parameter :: wanted_estimate = 0.3_wp, largest_estimate = 4.0_wp !! of the error, in tolerances
    real(wp), parameter :: first_phase = 2.0_wp      !! fastest frequency times the first step
-   real(wp), parameter :: smallest_phase = 0.2_wp  !! slower vibrations need no implicit treatment
+   real(wp), parameter :: smallest_phase = 0.4_wp  !! slower vibrations need no implicit treatment
    real(wp), parameter :: search_cost = 1.5_wp      !! finding modes, in iterations per unknown
 
    ! The numbers of the method, made once: a sweep has thousands of integrators.
@@ -65,7 +65,8 @@ module rodyn_gauss_integrator
       type(stiff_modes) :: modes
       type(step_matrices), allocatable :: now, spare      !! for the step in hand; for steps to outputs
       type(step_record) :: last, trial       !! the last accepted step, the one being tried
-      real(wp), allocatable :: modal(:, :), reply(:, :) !! workspace (s, modes)
+      real(wp), allocatable :: modal(:, :), reply(:, :), stiff(:, :) !! workspace (s, modes)
+      real(wp), allocatable :: rest(:), motion(:) !! v.q and v.p at the start of a step (modes)
       real(wp), allocatable :: guess(:, :)   !! workspace (s, n_dof)
       real(wp), allocatable :: node_state(:), node_rate(:) !! workspace: (q, p) at one node; rates of the quadratures
       real(wp), allocatable :: weight(:)     !! 1/tolerance of the rates (n_dof)
@@ -211,8 +212,7 @@ contains
       call swap_matrices(self%now, self%spare)
       call set_step(self, h)
       call set_weights(self, self%y_before)
-      self%trial%f(:, :) = 0.0_wp
-      call apply(self%mechanics%n_dof, self%rule%interpolation(0.0_wp, h/self%last%h), self%last%f, self%trial%f)
+      call multiply(self%mechanics%n_dof, self%rule%interpolation(0.0_wp, h/self%last%h), self%last%f, self%trial%f)
       rate = self%rate
       call iterate(self, self%t_before, self%y_before, ok)
       self%rate = rate
@@ -343,9 +343,18 @@ contains
       self%fewest = most_iterations
       self%now%h = 0.0_wp
       self%spare%h = 0.0_wp
-      if (allocated(self%modal)) deallocate (self%modal, self%reply)
-      allocate (self%modal(s, self%modes%n), self%reply(s, self%modes%n))
-      if (self%has_history) call remove_stiff_part(self, self%last)
+      if (allocated(self%modal)) then
+         if (size(self%modal, 2) /= self%modes%n) deallocate (self%modal, self%reply, self%stiff, self%rest, self%motion)
+      end if
+      if (.not. allocated(self%modal)) then
+         associate (n => self%modes%n)
+            allocate (self%modal(s, n), self%reply(s, n), self%stiff(s, n), self%rest(n), self%motion(n))
+         end associate
+      end if
+      if (self%has_history) then
+         call restore_nodes(self, self%last)
+         call remove_stiff_part(self, self%last)
+      end if
    end subroutine search_modes
 
    !> Matrices for a step of length h.
@@ -385,31 +394,34 @@ contains
    subroutine predict(self, ok)
       class(gauss_integrator), intent(inout) :: self
       logical, intent(out) :: ok
-      real(wp) :: rest, motion, stiff(s)
       integer :: i, m, base
 
       m = self%mechanics%n_dof
+      base = self%mechanics%n_ignorable
       ok = .true.
       if (.not. self%has_history) then
          call begin_history(self, ok)
          if (.not. ok) return
       end if
-      self%trial%f(:, :) = 0.0_wp
       if (self%now%h_last /= self%last%h) then
          self%now%h_last = self%last%h
          self%now%ahead = self%rule%interpolation(1.0_wp, self%now%h/self%last%h)
       end if
-      call apply(m, self%now%ahead, self%last%smooth, self%trial%f)
-      base = self%mechanics%n_ignorable
-      call project(m - base, self%modes%n, self%modes%v, self%trial%f(:, base + 1:), self%modal)
-      do i = 1, self%modes%n
-         rest = dot_product(self%modes%v(:, i), self%y(base + 1:m))
-         motion = dot_product(self%modes%v(:, i), self%y(m + base + 1:2*m))
-         stiff = self%modes%omega_2(i)*(rest + (self%now%h*motion)*self%rule%c) + self%modes%damping(i)*motion
-         self%reply(:, i) = -stiff
-         call apply_one(self%now%g(:, :, i), self%modal(:, i) - stiff, self%reply(:, i))
-      end do
-      call expand(m, self%modes%n, self%modes%u, self%reply, self%trial%f)
+      call multiply(m, self%now%ahead, self%last%smooth, self%trial%smooth)
+      associate (modes => self%modes)
+         call project(m - base, modes%n, modes%v, self%trial%smooth(:, base + 1:), self%modal)
+         call project_pair(m - base, modes%n, modes%v, self%y(base + 1:), self%y(m + base + 1:), self%rest, self%motion)
+         do i = 1, modes%n
+            self%rest(i) = -modes%omega_2(i)*self%rest(i) - modes%damping(i)*self%motion(i)
+            self%motion(i) = -modes%omega_2(i)*self%motion(i)
+         end do
+         call straight_lines(modes%n, self%rest, self%motion, self%now%h, self%rule%c, self%stiff)
+         call accumulate(modes%n, self%stiff, self%modal)
+         call combine(modes%n, self%now%g, self%modal, self%reply)
+         call accumulate(modes%n, self%stiff, self%reply)
+         call copy(m, self%trial%smooth, self%trial%f)
+         call expand(m, modes%n, modes%u, self%reply, self%trial%f)
+      end associate
    end subroutine predict
 
    !> Before the first step: the smooth part is taken to be constant.
@@ -439,6 +451,19 @@ contains
       call expand(self%mechanics%n_dof, self%modes%n, self%modes%u, self%modal, record%smooth)
    end subroutine remove_stiff_part
 
+   !> Q and P of the last step, whose last correction `iterate` may have left out.
+   subroutine restore_nodes(self, record)
+      class(gauss_integrator), intent(inout) :: self
+      type(step_record), intent(inout) :: record
+
+      associate (m => self%mechanics%n_dof, base => self%mechanics%n_ignorable, h => record%h)
+         call straight_lines(m, self%y_before, self%y_before(m + 1:), h, self%rule%c, record%q)
+         call straight_lines(m, self%y_before(m + 1:), self%y_before(m + 1:), 0.0_wp, self%rule%c, record%p)
+         call apply_both(m - base, h*self%rule%a, h**2*self%rule%a2, record%f(:, base + 1:), record%p(:, base + 1:), &
+                         record%q(:, base + 1:))
+      end associate
+   end subroutine restore_nodes
+
    !> modal = omega^2 v.Q + damping v.P.
    subroutine stiff_rates(self, q, p)
       class(gauss_integrator), intent(inout) :: self
@@ -454,7 +479,10 @@ contains
       end associate
    end subroutine stiff_rates
 
-   !> Solve for F of `trial` from its first guess. Q and P follow.
+   !> Solve for F of `trial` from its first guess. Q and P follow, but for the last correction where nobody asks for it.
+   !>
+   !> What F has beside the stiff part, N = F + sum u (omega^2 v.Q + damping v.P), follows from the residuals alone: the
+   !> correction that answers R changes N by R, since (1 - G)(1 + h damping A + h^2 omega^2 A^2) = 1.
    subroutine iterate(self, t, y, ok)
       class(gauss_integrator), intent(inout) :: self
       real(wp), contiguous, intent(in) :: y(:)
@@ -462,6 +490,7 @@ contains
       logical, intent(out) :: ok
       real(wp) :: change, before, times(s), sums(s)
       integer :: j, m, base
+      logical :: done
 
       m = self%mechanics%n_dof
       base = self%mechanics%n_ignorable
@@ -474,25 +503,44 @@ contains
          self%counts%n_rhs = self%counts%n_rhs + s
          self%refused = .not. ok
          if (.not. ok) return
-         call subtract(m, self%trial%a, self%trial%f, self%guess)
+         call residual(m, self%trial%a, self%trial%f, self%guess, self%trial%smooth)
          call project(m - base, self%modes%n, self%modes%v, self%guess(:, base + 1:), self%modal)
          call combine(self%modes%n, self%now%g, self%modal, self%reply)
          call expand(m, self%modes%n, self%modes%u, self%reply, self%guess)
          call add(m, self%guess, self%weight, self%trial%f, sums)
-         call move_nodes(self, self%guess)
          change = self%now%h*sqrt(sum(sums)/real(s*m, wp))
-         if (.not. ieee_is_finite(change)) exit
+         call judge(done)
+         if (done) exit
+         call move_nodes(self, self%guess)
+         before = change
+      end do
+      ok = ok .and. done
+      if (.not. ok) return
+      if (size(y) > 2*m) then ! the quadratures need all of Q and P
+         call move_nodes(self, self%guess)
+      else
+         call apply(base, self%now%h_a, self%guess, self%trial%p)
+      end if
+
+   contains
+
+      !> Whether this correction was the last one; not `ok`: there is no hope.
+      subroutine judge(done)
+         logical, intent(out) :: done
+         done = .true.
+         ok = ieee_is_finite(change)
+         if (.not. ok) return
          if (j > 1) then
             if (change > 0.5_wp*before) then ! no progress: at the level of rounding, or hopeless
                ok = change <= max(0.1_wp, rounding(self, y))
                if (ok .or. (j > 4 .and. change > 2.0_wp*before)) return
+               ok = .true.
             end if
             self%rate = min(1.0_wp, max(1.0e-4_wp, change/before))
          end if
-         if (self%rate*change <= iteration_error) return
-         before = change
-      end do
-      ok = .false.
+         done = self%rate*change <= iteration_error
+      end subroutine judge
+
    end subroutine iterate
 
    !> What rounding leaves of a correction, in tolerances: that of F, and that of Q, which F must balance.
@@ -573,8 +621,7 @@ contains
    subroutine legendre_coefficients(self, coefficient)
       class(gauss_integrator), intent(in) :: self
       real(wp), contiguous, intent(out) :: coefficient(:, :) !! (s, n_dof)
-      coefficient = 0.0_wp
-      call apply(size(coefficient, 2), self%rule%coefficients, self%trial%f, coefficient)
+      call multiply(size(coefficient, 2), self%rule%coefficients, self%trial%f, coefficient)
    end subroutine legendre_coefficients
 
    !> Displacement of C along axes that turn. As a complex number u' = V - i w u, so with theta the turn since the start
@@ -624,7 +671,6 @@ contains
       real(wp) :: y_new
       integer :: i
 
-      call remove_stiff_part(self, self%trial)
       self%trial%h = h
       call swap_records(self%last, self%trial)
       do i = 1, size(self%y)

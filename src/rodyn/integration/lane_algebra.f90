@@ -7,7 +7,8 @@ module rodyn_lane_algebra
    use rodyn_lanes, only: s => lanes
    implicit none (type, external)
    private
-   public :: apply, apply_one, apply_both, project, expand, combine, square_sums, straight_lines, subtract, add
+   public :: apply, apply_one, apply_both, multiply, project, project_pair, expand, combine, square_sums, straight_lines, &
+      residual, add, accumulate, copy
 
 contains
 
@@ -38,6 +39,35 @@ contains
          call apply_one(a, x(:, j), y(:, j))
       end do
    end subroutine apply
+
+   !> y(:, j) = A x(:, j).
+   pure subroutine multiply(n, a, x, y)
+      integer, intent(in) :: n
+      real(wp), intent(in) :: a(s, s), x(s, n)
+      real(wp), intent(out) :: y(s, n)
+      real(wp), dimension(s) :: y_1, y_2, y_3
+      integer :: i, j, l
+      do j = 1, n - 2, 3
+         y_1 = 0.0_wp
+         y_2 = 0.0_wp
+         y_3 = 0.0_wp
+         do i = 1, s
+            !$omp simd
+            do l = 1, s
+               y_1(l) = y_1(l) + a(l, i)*x(i, j)
+               y_2(l) = y_2(l) + a(l, i)*x(i, j + 1)
+               y_3(l) = y_3(l) + a(l, i)*x(i, j + 2)
+            end do
+         end do
+         y(:, j) = y_1
+         y(:, j + 1) = y_2
+         y(:, j + 2) = y_3
+      end do
+      do j = n - modulo(n, 3) + 1, n
+         y(:, j) = 0.0_wp
+         call apply_one(a, x(:, j), y(:, j))
+      end do
+   end subroutine multiply
 
    !> y = y + A x. Two sums, since each addition waits for the one before.
    pure subroutine apply_one(a, x, y)
@@ -131,6 +161,33 @@ contains
          z(:, i + 3) = sum_4
       end do
    end subroutine project
+
+   !> f_i = sum_j v(j, i) x_j and g_i = sum_j v(j, i) y_j: no lanes, but eight sums at a time, none of which waits for another.
+   pure subroutine project_pair(n, m, v, x, y, f, g)
+      integer, intent(in) :: n, m
+      real(wp), intent(in) :: v(n, m), x(n), y(n)
+      real(wp), intent(out) :: f(m), g(m)
+      real(wp), dimension(4) :: sum_x, sum_y
+      integer :: i, j, l, single
+
+      single = mod(m, 4)
+      do i = 1, single
+         f(i) = dot_product(v(:, i), x)
+         g(i) = dot_product(v(:, i), y)
+      end do
+      do i = single + 1, m, 4
+         sum_x = 0.0_wp
+         sum_y = 0.0_wp
+         do j = 1, n
+            do l = 1, 4
+               sum_x(l) = sum_x(l) + v(j, i + l - 1)*x(j)
+               sum_y(l) = sum_y(l) + v(j, i + l - 1)*y(j)
+            end do
+         end do
+         f(i:i + 3) = sum_x
+         g(i:i + 3) = sum_y
+      end do
+   end subroutine project_pair
 
    !> x(:, j) = x(:, j) + sum_i u(i, j) z(:, i).
    pure subroutine expand(n, m, u, z, x)
@@ -236,12 +293,36 @@ contains
       end do
    end subroutine add
 
-   !> z = x - y.
-   pure subroutine subtract(n, x, y, z)
+   !> y = y + x.
+   pure subroutine accumulate(n, x, y)
+      integer, intent(in) :: n
+      real(wp), intent(in) :: x(s, n)
+      real(wp), intent(inout) :: y(s, n)
+      y = y + x
+   end subroutine accumulate
+
+   !> z = x - y; total = total + z.
+   pure subroutine residual(n, x, y, z, total)
       integer, intent(in) :: n
       real(wp), intent(in) :: x(s, n), y(s, n)
       real(wp), intent(out) :: z(s, n)
-      z = x - y
-   end subroutine subtract
+      real(wp), intent(inout) :: total(s, n)
+      integer :: j, l
+      do j = 1, n
+         !$omp simd
+         do l = 1, s
+            z(l, j) = x(l, j) - y(l, j)
+            total(l, j) = total(l, j) + z(l, j)
+         end do
+      end do
+   end subroutine residual
+
+   !> y = x.
+   pure subroutine copy(n, x, y)
+      integer, intent(in) :: n
+      real(wp), intent(in) :: x(s, n)
+      real(wp), intent(out) :: y(s, n)
+      y = x
+   end subroutine copy
 
 end module rodyn_lane_algebra
