@@ -13,6 +13,7 @@ program tester
    use test_integrators, only: collect_integrators
    use test_kernels, only: collect_kernels
    use test_lanes, only: collect_lanes
+   use test_locks, only: collect_locks
    use test_method_choice, only: collect_method_choice
    use test_motion, only: collect_motion
    use test_newton, only: collect_newton
@@ -42,6 +43,7 @@ program tester
 
    call run('quadrature', collect_quadrature)
    call run('kernels', collect_kernels)
+   call run('locks', collect_locks)
    call run('lanes', collect_lanes)
    call run('motion', collect_motion)
    call run('newton', collect_newton)

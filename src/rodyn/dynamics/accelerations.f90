@@ -5,11 +5,13 @@ module rodyn_accelerations
    use rodyn_scene, only: scene_type
    use rodyn_workspace, only: workspace_type, new_workspace
    use rodyn_trigonometry, only: sine_cosine
-   use rodyn_hinge_law, only: hinge_moments
+   use rodyn_hinge_law, only: hinge_moments, hinge_state, openings
    use rodyn_loads, only: load_regime, load_forces, new_load_regime, evaluate_loads
    use rodyn_recursion_flexible, only: flexible_accelerations
    use rodyn_recursion_rigid, only: rigid_accelerations
    use rodyn_recursion_lumped, only: lumped_accelerations
+   use rodyn_recursion_joints, only: joint_recursion, new_joint_recursion, joint_accelerations
+   use rodyn_locks, only: has_slaves, expand
    use rodyn_lanes, only: lanes
    use rodyn_lane_scene, only: lane_scene, new_lane_scene, suits_lanes
    use rodyn_lane_accelerations, only: lane_work, new_lane_work, group_accelerations
@@ -18,13 +20,16 @@ module rodyn_accelerations
    private
    public :: dynamics_type, new_dynamics
 
-   integer, parameter :: path_flexible = 1, path_rigid = 2, path_lumped = 3, path_assembled = 4
+   integer, parameter :: path_flexible = 1, path_rigid = 2, path_lumped = 3, path_assembled = 4, path_joints = 5
 
    !> A scene with its memory and the loads that act now. One per thread.
    type :: dynamics_type
       type(scene_type) :: scene
       type(workspace_type) :: work
       type(assembled_system) :: system !! for the assembled kernel only
+      type(joint_recursion), allocatable :: joints !! for locked hinges; allocated when first needed
+      real(wp), allocatable :: opening_acceleration(:) !! of locked hinges, given (0:n-1) [rad/s^2]
+      integer :: n_locks = 0           !! how often hinges were locked or freed: what was derived from the scene is then stale
       type(load_regime) :: regime      !! loads between the last switch and the next
       type(load_forces) :: forces      !! their values
       integer :: path = path_flexible  !! which kernel
@@ -36,13 +41,18 @@ module rodyn_accelerations
       real(wp), allocatable, dimension(:) :: lane_q, lane_p, lane_rates !! of one lane (n_dof), where lanes have no kernel
    contains
       procedure :: set_regime
+      procedure :: set_locked
+      procedure :: project_locked
+      procedure :: hinge_rotations
+      procedure :: velocity_jump
       procedure :: accelerations
       procedure :: lane_accelerations
    end type dynamics_type
 
 contains
 
-   !> Choose the kernel and allocate its memory. No loads act until `set_regime`.
+   !> Choose the kernel and allocate its memory. No loads act until `set_regime`. Hinges that are locked in the scene stay
+   !> so, without motion of their own.
    subroutine new_dynamics(dynamics, scene, error)
       type(dynamics_type), intent(out) :: dynamics
       type(scene_type), intent(in) :: scene
@@ -51,19 +61,33 @@ contains
       dynamics%scene = scene
       call new_workspace(dynamics%work, scene)
       allocate (dynamics%forces%node(2, 0))
-      if (scene%assembled) then
-         dynamics%path = path_assembled
-         dynamics%needs_moments = size(scene%hinges%relaxing) > 0
-         call new_assembled_system(dynamics%system, scene, error)
-      else if (scene%lumped) then
-         dynamics%path = path_lumped
-      else if (scene%dynamic_bending) then
-         dynamics%path = path_flexible
-         dynamics%needs_moments = .false.
-      else
-         dynamics%path = path_rigid
-      end if
+      allocate (dynamics%opening_acceleration(0:scene%n - 1), source=0.0_wp)
+      call choose_path(dynamics, error)
    end subroutine new_dynamics
+
+   !> The kernel for the scene as it is locked now.
+   subroutine choose_path(self, error)
+      type(dynamics_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+
+      self%needs_moments = .true.
+      if (self%scene%assembled) then
+         self%path = path_assembled
+         self%needs_moments = size(self%scene%hinges%relaxing) > 0 .or. self%scene%hinges%has_locks
+         call new_assembled_system(self%system, self%scene, error)
+      else if (has_slaves(self%scene)) then
+         self%path = path_joints
+         if (.not. allocated(self%joints)) allocate (self%joints)
+         call new_joint_recursion(self%joints, self%scene)
+      else if (self%scene%lumped) then
+         self%path = path_lumped
+      else if (self%scene%dynamic_bending) then
+         self%path = path_flexible
+         self%needs_moments = .false.
+      else
+         self%path = path_rigid
+      end if
+   end subroutine choose_path
 
    !> Make the loads between two neighbouring switch times act.
    subroutine set_regime(self, t_from, t_to)
@@ -75,6 +99,100 @@ contains
       self%varying = size(self%regime%varying) > 0
       self%group_is_current = .false.
    end subroutine set_regime
+
+   !> Lock these hinges and free all others: from now on the accelerations keep (opening_k)'' as prescribed where a hinge
+   !> is locked, and `work%moment(k)` is all of the moment that it passes. Cheap where the set stays the same; then
+   !> `opening_acceleration` may as well be assigned directly. State and rates must fit: `project_locked`, `velocity_jump`.
+   !> With quasistatic bending it is th that is locked, at `theta`, and `opening_acceleration` is not used.
+   subroutine set_locked(self, locked, opening_acceleration, theta, error)
+      class(dynamics_type), intent(inout) :: self
+      logical, intent(in) :: locked(0:)                !! (0:n-1)
+      real(wp), intent(in) :: opening_acceleration(0:) !! (0:n-1) [rad/s^2]; zero for a plain lock
+      real(wp), intent(in), optional :: theta(0:)      !! quasistatic: th of locked hinges (0:n-1) [rad]; absent: as it was, or 0
+      type(error_type), allocatable, intent(out), optional :: error !! the assembled kernel found no memory
+      type(error_type), allocatable :: failure
+      real(wp) :: held(0:self%scene%n - 1)
+
+      self%opening_acceleration(:) = opening_acceleration
+      associate (law => self%scene%hinges)
+         if (all(locked .eqv. law%locked) .and. .not. present(theta)) return
+         held = 0.0_wp
+         held(law%held) = law%held_at
+         if (present(theta)) held = theta
+         call law%lock(locked, held)
+      end associate
+      self%n_locks = self%n_locks + 1
+      call choose_path(self, failure)
+      if (present(error)) call move_alloc(failure, error)
+   end subroutine set_locked
+
+   !> Put the redundant angle and rate of each locked hinge where the lock has them: phi of the rod beyond. The
+   !> constraint is linear in q, so that integrators keep it to rounding. With quasistatic bending nothing is redundant.
+   pure subroutine project_locked(self, opening, opening_rate, q, p)
+      class(dynamics_type), intent(in) :: self
+      real(wp), intent(in) :: opening(0:)      !! of locked hinges, kink included (0:n-1) [rad]
+      real(wp), intent(in) :: opening_rate(0:) !! (0:n-1) [rad/s]
+      real(wp), intent(inout) :: q(:), p(:)
+
+      if (.not. has_slaves(self%scene)) return
+      call expand(self%scene, self%scene%hinges%locked, opening, q(:self%scene%n_dof))
+      call expand(self%scene, self%scene%hinges%locked, opening_rate, p)
+   end subroutine project_locked
+
+   !> Joint rotations th of all hinges: where `set_locked` may hold them.
+   pure subroutine hinge_rotations(self, q, p, theta)
+      class(dynamics_type), intent(in) :: self
+      real(wp), intent(in) :: q(:), p(:)
+      real(wp), intent(out) :: theta(0:) !! (0:n-1) [rad]
+      real(wp) :: theta_rate(0:self%scene%n - 1), moment(0:self%scene%n), moment_rate(0:self%scene%n)
+
+      associate (scene => self%scene, first => self%scene%n_base + 1)
+         call hinge_state(scene%hinges, scene%n, scene%dynamic_bending, q(first:), p(first:), theta, theta_rate, moment, &
+                          moment_rate)
+      end associate
+   end subroutine hinge_rotations
+
+   !> Rates after hinges have snapped shut (an impact without rebound): M (p+ - p) = sum_k impulse_k d(opening_k)/dq over all
+   !> locked hinges, so that (opening_k)'+ is as given there. Momenta are kept. What is lost,
+   !>     (p+ - p)^T M (p+ - p)/2 = T - T+ + sum_k impulse_k (opening_k)'+,
+   !> is all of the difference in kinetic energy if the hinges come to rest. The scene need not be locked yet. With
+   !> quasistatic bending massless joints stop without an impact: nothing happens to p. O(n).
+   subroutine velocity_jump(self, q, p, locked, opening_rate, p_after, energy_lost, impulse, ok)
+      class(dynamics_type), intent(inout) :: self
+      real(wp), intent(in) :: q(:), p(:)        !! coordinates and rates before
+      logical, intent(in) :: locked(0:)         !! hinges that are locked afterwards, new and old (0:n-1)
+      real(wp), intent(in) :: opening_rate(0:)  !! (opening)' of locked hinges afterwards (0:n-1) [rad/s]; zero for plain locks
+      real(wp), intent(out) :: p_after(:)       !! rates afterwards
+      real(wp), intent(out) :: energy_lost      !! not negative [J]
+      real(wp), intent(out) :: impulse(0:)      !! of the moment -T on each opening (0:n-1) [N m s]
+      logical, intent(out) :: ok                !! false: not finite, or M not positive definite
+      real(wp) :: jump(0:self%scene%n - 1), moment(0:self%scene%n), rest(self%scene%n_dof), change(self%scene%n_dof)
+      real(wp), parameter :: none(3) = 0.0_wp, nowhere(2, 1) = 0.0_wp
+
+      p_after = p
+      energy_lost = 0.0_wp
+      impulse = 0.0_wp
+      ok = .true.
+      associate (scene => self%scene, work => self%work, first => self%scene%n_base + 1)
+         if (scene%quasistatic .or. .not. any(locked)) return
+         if (.not. allocated(self%joints)) then
+            allocate (self%joints)
+            call new_joint_recursion(self%joints, scene)
+         end if
+         call openings(scene%n, scene%dynamic_bending, p(first:), jump)
+         jump = merge(opening_rate - jump, 0.0_wp, locked)
+         rest = 0.0_wp
+         moment = 0.0_wp
+         call sine_cosine(scene%n, q(first:first + scene%n - 1), work%sine(1:), work%cosine(1:))
+         call joint_accelerations(self%joints, scene, work%sine, work%cosine, q, rest, .false., locked, jump, moment, none, &
+                                  .false., nowhere, change, ok)
+         if (.not. ok) return
+         where (locked) impulse = -moment(:scene%n - 1)
+         energy_lost = max(0.0_wp, 0.5_wp*sum(impulse*jump))
+         p_after = p + change
+         call expand(scene, locked, opening_rate, p_after)
+      end associate
+   end subroutine velocity_jump
 
    !> p' for given coordinates and rates. Allocates nothing.
    subroutine accelerations(self, t, q, p, acceleration, ok)
@@ -103,9 +221,14 @@ contains
             call lumped_accelerations(scene%n, scene%n_base, scene%rods, scene%rod_of, scene%node_mass, scene%body, &
                                       work%sine, work%cosine, p, work%moment, self%forces%base, &
                                       self%regime%on_nodes, self%forces%node, work%outward, acceleration, ok)
+         case (path_joints)
+            call joint_accelerations(self%joints, scene, work%sine, work%cosine, q, p, .true., scene%hinges%locked, &
+                                     self%opening_acceleration, work%moment, self%forces%base, self%regime%on_nodes, &
+                                     self%forces%node, acceleration, ok)
          case default
-            call assembled_accelerations(self%system, scene, work%sine, work%cosine, q, p, work%moment, self%forces%base, &
-                                         self%regime%on_nodes, self%forces%node, acceleration, ok)
+            call assembled_accelerations(self%system, scene, work%sine, work%cosine, q, p, work%moment, &
+                                         self%opening_acceleration, self%forces%base, self%regime%on_nodes, &
+                                         self%forces%node, acceleration, ok)
          end select
       end associate
    end subroutine accelerations
@@ -128,7 +251,7 @@ contains
       ok = all(lane_ok)
    end subroutine lane_accelerations
 
-   !> Lane after lane, for the assembled kernel.
+   !> Lane after lane, for the assembled kernel and for locked hinges.
    subroutine one_by_one(self, t, q, p, acceleration, ok)
       class(dynamics_type), intent(inout) :: self
       real(wp), intent(in) :: t(lanes)

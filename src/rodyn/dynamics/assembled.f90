@@ -3,12 +3,13 @@
 !> Written independently of the recursion, as the second route to the same accelerations. For the columns of N,
 !>     z = (w Vx, w Vy, w^2, phi_m'(2 w + phi_m'), (w + phi_m') alpha_m', (w + phi_m') beta_m'),  m = 1..n;
 !> the article joins the last two for uniform rods, where int m Na = -int m Nb. On a fixed spacecraft the first
-!> three rows and columns are absent. For massless rods all rod integrals are zero.
+!> three rows and columns are absent. For massless rods all rod integrals are zero. Locked hinges: `rodyn_locks`.
 module rodyn_assembled
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type, raise
    use rodyn_scene, only: scene_type
+   use rodyn_locks, only: has_slaves, reduce, expand, reduce_matrix, reactions
    use rodyn_lapack, only: dpotrf, dpotrs, dgesv, dgemv
    implicit none (type, external)
    private
@@ -38,6 +39,7 @@ contains
       type(scene_type), intent(in) :: scene
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: b(:, :), c(:, :), r(:, :)
+      real(wp) :: factor(0:scene%n - 1), angle(0:scene%n - 1)
       character(len=32) :: size_text
       integer :: status, n_dof, n, k
 
@@ -53,20 +55,26 @@ contains
          return
       end if
       system%damped = scene%hinges%has_damping
-      system%kinked = scene%hinges%has_kinks
       call joint_map(scene, b)
       r = 0.0_wp ! th = r q - r_gamma
       c = b
       if (scene%quasistatic) call soften(scene, c)
-      ! Generalised spring force -K q + Q2 with K = B^T C G B; dampers D = (G B)^T D (G B).
-      do k = 0, n - 1
-         r(k, :) = scene%hinges%stiffness(k)*c(k, :)
-      end do
-      system%k = matmul(transpose(b), r)
-      system%q2 = matmul(scene%hinges%kink, r)
-      do k = 0, n - 1
-         r(k, :) = scene%hinges%damping(k)*c(k, :)
-      end do
+      ! Generalised spring force -K q + Q2 with K = B^T C G B; dampers D = (G B)^T D (G B). A locked hinge has neither;
+      ! with quasistatic bending its row of G B is that of its moment.
+      associate (law => scene%hinges)
+         factor = merge(merge(1.0_wp, 0.0_wp, scene%quasistatic), law%stiffness, law%locked)
+         angle = law%kink
+         angle(law%held) = angle(law%held) + law%held_at
+         do k = 0, n - 1
+            r(k, :) = factor(k)*c(k, :)
+         end do
+         system%k = matmul(transpose(b), r)
+         system%q2 = matmul(angle, r)
+         system%kinked = any(abs(angle) > 0.0_wp)
+         do k = 0, n - 1
+            r(k, :) = merge(0.0_wp, law%damping(k), law%locked(k))*c(k, :)
+         end do
+      end associate
       system%d = matmul(transpose(c), r)
       if (scene%dynamic_bending) call add_bending(scene, system%k)
    end subroutine new_assembled_system
@@ -87,29 +95,29 @@ contains
       end do
    end subroutine joint_map
 
-   !> Quasistatic bending: G B with G = (I + F C)^-1, F the flexibility of the rods (three moments).
+   !> Quasistatic bending: G B with G = (I + F C)^-1, F the flexibility of the rods (three moments). Of a locked hinge
+   !> the moment is the unknown and th is given: its column is that of F alone.
    subroutine soften(scene, b)
       type(scene_type), intent(in) :: scene
       real(wp), intent(inout) :: b(0:, :)
-      real(wp) :: g(0:scene%n - 1, 0:scene%n - 1), slope
+      real(wp) :: g(0:scene%n - 1, 0:scene%n - 1), c(0:scene%n - 1), slope
       integer :: pivots(scene%n), info, k
 
       g = 0.0_wp
+      c = merge(1.0_wp, scene%hinges%stiffness, scene%hinges%locked)
       do k = 0, scene%n - 1
-         g(k, k) = 1.0_wp
+         if (.not. scene%hinges%locked(k)) g(k, k) = 1.0_wp
       end do
-      associate (c => scene%hinges%stiffness)
-         do k = 1, scene%n
-            associate (rod => scene%rods(scene%rod_of(k)))
-               slope = rod%length/(6.0_wp*rod%bending_stiffness)
-            end associate
-            g(k - 1, k - 1) = g(k - 1, k - 1) + 2.0_wp*slope*c(k - 1)
-            if (k == scene%n) cycle
-            g(k, k) = g(k, k) + 2.0_wp*slope*c(k)
-            g(k - 1, k) = slope*c(k)
-            g(k, k - 1) = slope*c(k - 1)
-         end do
-      end associate
+      do k = 1, scene%n
+         associate (rod => scene%rods(scene%rod_of(k)))
+            slope = rod%length/(6.0_wp*rod%bending_stiffness)
+         end associate
+         g(k - 1, k - 1) = g(k - 1, k - 1) + 2.0_wp*slope*c(k - 1)
+         if (k == scene%n) cycle
+         g(k, k) = g(k, k) + 2.0_wp*slope*c(k)
+         g(k - 1, k) = slope*c(k)
+         g(k, k - 1) = slope*c(k - 1)
+      end do
       call dgesv(scene%n, scene%n_dof, g, scene%n, pivots, b, scene%n, info)
    end subroutine soften
 
@@ -132,13 +140,15 @@ contains
    end subroutine add_bending
 
    !> p' from M p' = Q1 + Q2 - N z - D p - K q by Cholesky.
-   subroutine assembled_accelerations(system, scene, sine, cosine, q, p, moment, base_force, loaded, node_force, &
-                                      acceleration, ok)
+   subroutine assembled_accelerations(system, scene, sine, cosine, q, p, moment, opening_acceleration, base_force, loaded, &
+                                      node_force, acceleration, ok)
       type(assembled_system), intent(inout) :: system
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: sine(0:), cosine(0:) !! of phi (0:n)
       real(wp), intent(in) :: q(:), p(:)           !! coordinates and rates (dof)
-      real(wp), intent(in) :: moment(0:)           !! hinge moments (0:n), used if hinges relax: T is then no K q + D p
+      real(wp), intent(inout) :: moment(0:)        !! hinge moments (0:n), used if hinges relax: T is then no K q + D p;
+                                                   !! those of locked hinges are results unless bending is quasistatic
+      real(wp), intent(in) :: opening_acceleration(0:) !! of locked hinges, given (0:n-1) [rad/s^2]
       real(wp), intent(in) :: base_force(3)        !! X_C, Y_C, M_C
       logical, intent(in) :: loaded                !! node_force is to be used
       real(wp), intent(in) :: node_force(2, *)     !! X, Y at the nodes [N]
@@ -163,12 +173,50 @@ contains
          call dgemv('N', n_dof, n_dof, -1.0_wp, system%k, n_dof, q, 1, 1.0_wp, acceleration, 1)
          if (system%damped) call dgemv('N', n_dof, n_dof, -1.0_wp, system%d, n_dof, p, 1, 1.0_wp, acceleration, 1)
       end if
+      if (has_slaves(scene)) then
+         call solve_locked(system, scene, opening_acceleration, acceleration, moment, ok)
+         return
+      end if
       call dpotrf('L', n_dof, system%m, n_dof, info)
       ok = info == 0
       if (.not. ok) return
       call dpotrs('L', n_dof, 1, system%m, n_dof, acceleration, n_dof, info)
       ok = info == 0 .and. all(ieee_is_finite(acceleration))
    end subroutine assembled_accelerations
+
+   !> The same with locked hinges: with p' = T z + a, a the part that is given, T^T M T z = T^T (forces - M a). N and its
+   !> z are used up.
+   subroutine solve_locked(system, scene, opening_acceleration, x, moment, ok)
+      type(assembled_system), intent(inout) :: system
+      type(scene_type), intent(in) :: scene
+      real(wp), intent(in) :: opening_acceleration(0:)
+      real(wp), intent(inout) :: x(:)       !! in: forces; out: p'
+      real(wp), intent(inout) :: moment(0:) !! of locked hinges: results
+      logical, intent(out) :: ok
+      integer :: info, n_dof
+
+      n_dof = scene%n_dof
+      associate (mass => system%n, forces => system%row, lacking => system%z)
+         mass = system%m
+         forces = x
+         x = 0.0_wp
+         call expand(scene, scene%hinges%locked, opening_acceleration, x)
+         lacking = forces
+         call dgemv('N', n_dof, n_dof, -1.0_wp, mass, n_dof, x, 1, 1.0_wp, lacking, 1)
+         call reduce(scene, lacking)
+         call reduce_matrix(scene, 1.0_wp, system%m)
+         call dpotrf('L', n_dof, system%m, n_dof, info)
+         ok = info == 0
+         if (.not. ok) return
+         call dpotrs('L', n_dof, 1, system%m, n_dof, lacking, n_dof, info)
+         x = lacking
+         call expand(scene, scene%hinges%locked, opening_acceleration, x)
+         lacking = -forces
+         call dgemv('N', n_dof, n_dof, 1.0_wp, mass, n_dof, x, 1, 1.0_wp, lacking, 1)
+         call reactions(scene, lacking, moment)
+      end associate
+      ok = info == 0 .and. all(ieee_is_finite(x))
+   end subroutine solve_locked
 
    !> z of the article for the rates p.
    pure subroutine quadratic_rates(scene, p, z)

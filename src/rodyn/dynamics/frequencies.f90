@@ -1,10 +1,12 @@
 !> Small motions of a scene about a configuration at rest, by LAPACK: natural frequencies K x = w^2 M x, and how
-!> fast its dampers act alone, D x = lambda M x.
+!> fast its dampers act alone, D x = lambda M x. Coordinates that locked hinges make redundant are left out
+!> (`rodyn_locks`).
 module rodyn_frequencies
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type, raise
    use rodyn_scene, only: scene_type
    use rodyn_assembled, only: assembled_system, new_assembled_system, mass_matrix
+   use rodyn_locks, only: has_slaves, free_coordinates, reduce_matrix
    use rodyn_lapack, only: dsygvd
    implicit none (type, external)
    private
@@ -16,7 +18,7 @@ contains
    subroutine natural_frequencies(scene, q, frequency, error)
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: q(:)                       !! coordinates (dof)
-      real(wp), allocatable, intent(out) :: frequency(:) !! (dof) [rad/s]
+      real(wp), allocatable, intent(out) :: frequency(:) !! (dof less redundant coordinates) [rad/s]
       type(error_type), allocatable, intent(out) :: error
       type(assembled_system) :: system
 
@@ -32,7 +34,7 @@ contains
    subroutine decay_rates(scene, q, rate, error)
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: q(:)                  !! coordinates (dof)
-      real(wp), allocatable, intent(out) :: rate(:) !! (dof) [1/s]
+      real(wp), allocatable, intent(out) :: rate(:) !! (dof less redundant coordinates) [1/s]
       type(error_type), allocatable, intent(out) :: error
       type(assembled_system) :: system
 
@@ -45,12 +47,12 @@ contains
    subroutine eigenvalues(scene, q, system, a, value, error)
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: q(:)
-      type(assembled_system), intent(inout) :: system !! its M is used up
+      type(assembled_system), intent(inout) :: system
       real(wp), intent(in) :: a(:, :)
       real(wp), allocatable, intent(out) :: value(:)
       type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: work(:), matrix(:, :)
-      integer, allocatable :: integer_work(:)
+      real(wp), allocatable :: work(:), matrix(:, :), mass(:, :)
+      integer, allocatable :: integer_work(:), free(:)
       real(wp) :: sine(0:scene%n), cosine(0:scene%n), work_size(1)
       integer :: info, m, integer_size(1)
 
@@ -61,10 +63,19 @@ contains
       sine(1:) = sin(q(scene%phi_at() + 1:scene%phi_at() + scene%n))
       cosine(1:) = cos(q(scene%phi_at() + 1:scene%phi_at() + scene%n))
       call mass_matrix(system, scene, sine, cosine, q)
+      mass = system%m
+      if (has_slaves(scene)) then
+         call reduce_matrix(scene, 1.0_wp, mass)
+         call reduce_matrix(scene, 0.0_wp, matrix)
+         free = free_coordinates(scene)
+         mass = mass(free, free)
+         matrix = matrix(free, free)
+         m = size(free)
+      end if
       allocate (value(m))
-      call dsygvd(1, 'N', 'L', m, matrix, m, system%m, m, value, work_size, -1, integer_size, -1, info)
+      call dsygvd(1, 'N', 'L', m, matrix, m, mass, m, value, work_size, -1, integer_size, -1, info)
       allocate (work(int(work_size(1))), integer_work(integer_size(1)))
-      call dsygvd(1, 'N', 'L', m, matrix, m, system%m, m, value, work, size(work), integer_work, size(integer_work), info)
+      call dsygvd(1, 'N', 'L', m, matrix, m, mass, m, value, work, size(work), integer_work, size(integer_work), info)
       if (info /= 0) call raise(error, 'dsygvd: no eigenvalues (mass matrix not positive definite, or no convergence)')
    end subroutine eigenvalues
 

@@ -7,7 +7,7 @@ module rodyn_motion
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
    use rodyn_lanes, only: lanes
-   use rodyn_ode, only: mechanical_system, stiff_modes
+   use rodyn_ode, only: mechanical_system, stiff_modes, factorise_dense, solve_dense
    use rodyn_scene_modes, only: modes_finder, new_modes_finder
    use rodyn_trigonometry, only: sine_cosine
    use rodyn_case_config, only: initial_config
@@ -17,6 +17,7 @@ module rodyn_motion
    use rodyn_assembled, only: assembled_system, new_assembled_system, mass_matrix
    use rodyn_linearisation, only: balance_tangent
    use rodyn_newton, only: newton_type
+   use rodyn_locks, only: has_slaves, reduce, expand, reduce_matrix
    use rodyn_kinematics, only: load_power, damper_power, dissipated_power, invariants_type, invariants
    use rodyn_hinge_law, only: relaxation_rates, initial_joints, hinge_tangent
    use rodyn_lapack, only: dpotrf, dpotrs
@@ -28,6 +29,7 @@ module rodyn_motion
    type, extends(mechanical_system) :: motion_type
       type(dynamics_type) :: dynamics
       type(modes_finder), allocatable :: modes !! allocated when first needed
+      integer :: n_locks_of_modes = 0  !! `dynamics%n_locks` when the modes finder was made
       type(assembled_system) :: system !! mass matrix of the Jacobian; allocated when first needed
       type(newton_type) :: newton      !! linear systems of implicit methods
       integer :: n_q = 0               !! length of q
@@ -160,9 +162,11 @@ contains
       type(stiff_modes), intent(inout) :: modes
       logical, intent(out) :: ok
 
+      if (allocated(self%modes) .and. self%n_locks_of_modes /= self%dynamics%n_locks) deallocate (self%modes)
       if (.not. allocated(self%modes)) then
          allocate (self%modes)
          call new_modes_finder(self%modes, self%dynamics%scene)
+         self%n_locks_of_modes = self%dynamics%n_locks
       end if
       ok = .true.
       modes%n = 0
@@ -196,7 +200,8 @@ contains
       end associate
    end function state_invariants
 
-   !> Exact Jacobian: the linearised balance solved with the mass matrix.
+   !> Exact Jacobian: the linearised balance solved with the mass matrix, from which what locked hinges make redundant is
+   !> eliminated (`rodyn_locks`). It takes the coordinates as they stand, also where they break the constraints.
    subroutine jacobian(self, t, y, jac, ok)
       class(motion_type), intent(inout) :: self
       real(wp), intent(in) :: t
@@ -205,6 +210,7 @@ contains
       logical, intent(out) :: ok
       type(error_type), allocatable :: error
       real(wp) :: a(self%n_dof), direction(self%n_controlled), change(self%n_dof, self%n_controlled)
+      real(wp) :: still(0:self%dynamics%scene%n - 1)
       integer :: j, info
 
       associate (r => self%n_q, m => self%n_dof, scene => self%dynamics%scene, work => self%dynamics%work)
@@ -223,10 +229,22 @@ contains
             direction(j) = 0.0_wp
          end do
          call mass_matrix(self%system, scene, work%sine, work%cosine, y(1:r))
+         if (has_slaves(scene)) then
+            call reduce_matrix(scene, 1.0_wp, self%system%m)
+            do j = 1, r + m
+               call reduce(scene, change(:, j))
+            end do
+         end if
          call dpotrf('L', m, self%system%m, m, info)
          ok = info == 0
          if (.not. ok) return
          call dpotrs('L', m, r + m, self%system%m, m, change, m, info)
+         if (has_slaves(scene)) then
+            still = 0.0_wp
+            do j = 1, r + m
+               call expand(scene, scene%hinges%locked, still, change(:, j))
+            end do
+         end if
          jac(r + 1:r + m, 1:r + m) = -change
          do j = 1, m
             jac(j, r + j) = 1.0_wp
@@ -241,7 +259,7 @@ contains
       end associate
    end subroutine jacobian
 
-   !> Factor 1 - gamma J in O(n), J without the rows of the two powers.
+   !> Factor 1 - gamma J in O(n), J without the rows of the two powers. With locked hinges by the dense Jacobian: O(n^3).
    subroutine factorise_newton(self, t, y, gamma, fresh, ok)
       class(motion_type), intent(inout) :: self
       real(wp), intent(in) :: t
@@ -251,6 +269,10 @@ contains
       logical, intent(out) :: ok
       real(wp) :: a(self%n_dof)
 
+      if (self%dynamics%scene%hinges%has_locks) then
+         call factorise_dense(self, t, y, gamma, fresh, ok)
+         return
+      end if
       ok = .true.
       associate (r => self%n_q, m => self%n_dof, scene => self%dynamics%scene, work => self%dynamics%work)
          if (fresh) then
@@ -267,7 +289,11 @@ contains
    subroutine solve_newton(self, x)
       class(motion_type), intent(inout) :: self
       real(wp), contiguous, intent(inout) :: x(:)
-      call self%newton%solve(self%dynamics%scene, x)
+      if (self%dynamics%scene%hinges%has_locks) then
+         call solve_dense(self, x)
+      else
+         call self%newton%solve(self%dynamics%scene, x)
+      end if
    end subroutine solve_newton
 
    !> Change of th' of the relaxing hinges.

@@ -2,13 +2,15 @@
 !>
 !> With the constant stiffness K = L L^T of springs and rods, the modes follow from the symmetric matrix
 !>     H = L^T M(q)^-1 L = Q diag(omega^2) Q^T,   u = M^-1 L Q / omega^2,   v = L Q.
-!> Loads, centrifugal and gyroscopic terms are left out: they are not stiff.
+!> Loads, centrifugal and gyroscopic terms are left out: they are not stiff. With locked hinges T (T^T M T)^-1 T^T stands for
+!> M^-1 (`rodyn_locks`).
 module rodyn_scene_modes
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
    use rodyn_ode, only: stiff_modes
    use rodyn_scene, only: scene_type
    use rodyn_assembled, only: assembled_system, new_assembled_system, mass_matrix
+   use rodyn_locks, only: has_slaves, reduce, expand, reduce_matrix
    use rodyn_lapack, only: dpotrf, dpotrs, dsyev, dgemm, dgemv
    implicit none (type, external)
    private
@@ -71,11 +73,23 @@ contains
       m = scene%n_dof
       rank = size(self%factor, 2)
       call mass_matrix(self%system, scene, sine, cosine, q)
+      self%shapes(:, :) = self%rotated
+      if (has_slaves(scene)) then
+         call reduce_matrix(scene, 1.0_wp, self%system%m)
+         do i = 1, rank
+            call reduce(scene, self%shapes(:, i))
+         end do
+      end if
       call dpotrf('L', m, self%system%m, m, info)
       ok = info == 0
       if (.not. ok) return
-      self%shapes(:, :) = self%rotated
       call dpotrs('L', m, rank, self%system%m, m, self%shapes, m, info)
+      if (has_slaves(scene)) then
+         self%work(:) = 0.0_wp
+         do i = 1, rank
+            call expand(scene, scene%hinges%locked, self%work(:scene%n), self%shapes(:, i))
+         end do
+      end if
       call dgemm('T', 'N', rank, rank, m, 1.0_wp, self%rotated, m, self%shapes, m, 0.0_wp, self%h, rank)
       call diagonalise(slowest**2, self%h, self%rotated, self%shapes)
       do i = 1, rank

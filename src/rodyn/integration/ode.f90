@@ -6,6 +6,7 @@ module rodyn_ode
    implicit none (type, external)
    private
    public :: ode_system, mechanical_system, stiff_modes
+   public :: factorise_dense, solve_dense
 
    !> A system of `n_states` equations, of which the first `n_controlled` take part in step-size control.
    !> The others are pure quadratures (work, dissipated energy): no equation depends on them, and a run
@@ -20,8 +21,8 @@ module rodyn_ode
    contains
       procedure(rhs_interface), deferred :: rhs
       procedure(jacobian_interface), deferred :: jacobian
-      procedure :: factorise_newton
-      procedure :: solve_newton
+      procedure :: factorise_newton => factorise_dense
+      procedure :: solve_newton => solve_dense
    end type ode_system
 
    !> The stiff part of M(q) p' = ... - K q - D p near a configuration, as modes: S = M^-1 K ~ sum omega^2 u v^T and
@@ -115,7 +116,7 @@ contains
 
    !> Factor 1 - gamma df/dy. Nothing depends on the quadratures; their rows are left out, so that a system with them is
    !> solved to the last bit as one without. Their own correction is within the tolerance of the iteration.
-   subroutine factorise_newton(self, t, y, gamma, fresh, ok)
+   subroutine factorise_dense(self, t, y, gamma, fresh, ok)
       class(ode_system), intent(inout) :: self
       real(wp), intent(in) :: t                !! time [s]
       real(wp), contiguous, intent(in) :: y(:) !! states (n_states)
@@ -130,13 +131,13 @@ contains
          self%dense%jacobian(self%n_controlled + 1:, :) = 0.0_wp
       end if
       if (ok) call self%dense%factorise(gamma, ok)
-   end subroutine factorise_newton
+   end subroutine factorise_dense
 
    !> x <- (1 - gamma df/dy)^-1 x.
-   subroutine solve_newton(self, x)
+   subroutine solve_dense(self, x)
       class(ode_system), intent(inout) :: self
       real(wp), contiguous, intent(inout) :: x(:) !! (n_states)
       call self%dense%solve(x)
-   end subroutine solve_newton
+   end subroutine solve_dense
 
 end module rodyn_ode

@@ -5,6 +5,10 @@
 !> `rodyn_three_moments`). Dampers in such a series are treated in one of two ways:
 !> - `reduced`: rates follow from the same system as rotations, accurate to (D w/C)^2;
 !> - `exact`: the rotation of each damped hinge is a state of its own, th' = (T - C th)/D, behind phi in q.
+!>
+!> A locked hinge is a constraint and its moment a reaction. Between rods with inertia or rigid ones the kernels find it
+!> (`rodyn_recursion_joints`, `rodyn_locks`). With quasistatic bending it comes from the three-moment equation, in which
+!> th is given; see docs/locks.md.
 module rodyn_hinge_law
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: chain_config
@@ -25,7 +29,12 @@ module rodyn_hinge_law
       logical :: quasistatic = .false.      !! rods bend without inertia
       type(three_moments) :: series         !! hinges and rods in series, when quasistatic
       integer, allocatable :: relaxing(:)   !! hinges whose rotation is a state (only quasistatic, exact dampers)
+      logical, allocatable :: locked(:)     !! a constraint stands for spring and damper (0:n-1)
+      logical :: has_locks = .false.        !! some are locked
+      integer, allocatable :: held(:)       !! quasistatic: locked hinges that are not relaxing,
+      real(wp), allocatable :: held_at(:)   !! and their th [rad]
    contains
+      procedure :: lock
       procedure :: fastest_relaxation
    end type hinge_law
 
@@ -42,6 +51,8 @@ contains
 
       law%n = chain%n_rods
       allocate (law%stiffness(0:law%n - 1), law%damping(0:law%n - 1), law%kink(0:law%n - 1))
+      allocate (law%locked(0:law%n - 1), source=.false.)
+      allocate (law%held(0), law%held_at(0))
       law%stiffness(:) = chain%hinge_stiffness
       law%damping(:) = chain%hinge_damping
       law%kink(:) = chain%kink
@@ -53,6 +64,29 @@ contains
       if (quasistatic) call new_three_moments(law%series, law%stiffness, &
                                               chain%length/(6.0_wp*chain%bending_stiffness), given)
    end subroutine new_hinge_law
+
+   !> Lock these hinges and free all others. With quasistatic bending the rotations at which they are held are needed,
+   !> except those of relaxing hinges, which are states and stay where they are.
+   subroutine lock(self, locked, theta)
+      class(hinge_law), intent(inout) :: self
+      logical, intent(in) :: locked(0:)            !! (0:n-1)
+      real(wp), intent(in), optional :: theta(0:)  !! th of locked hinges (0:n-1) [rad]; absent: 0
+      type(three_moments) :: series
+      logical :: given(0:self%n - 1), state(0:self%n - 1)
+      integer :: k
+
+      self%locked(:) = locked
+      self%has_locks = any(locked)
+      if (.not. self%quasistatic) return
+      state = .false.
+      state(self%relaxing) = .true.
+      self%held = pack([(k, k=0, self%n - 1)], locked .and. .not. state)
+      self%held_at = spread(0.0_wp, 1, size(self%held))
+      if (present(theta)) self%held_at = theta(self%held)
+      given = locked .or. state
+      call new_three_moments(series, self%stiffness, self%series%slope, given)
+      self%series = series
+   end subroutine lock
 
    !> Hinge moments T(0:n); T(n) = 0 at the free end. The opening of hinge k is phi_{k+1} - phi_k (rigid or
    !> quasistatic rods) or (phi + alpha)_{k+1} - (phi + beta)_k (dynamic bending), phi_0 = beta_0 = 0.
@@ -162,16 +196,50 @@ contains
 
       call openings(n, .false., angle, theta)
       if (law%has_kinks) theta = theta - law%kink
+      call take_held(law, theta)
       call law%series%solve(theta)
       moment(0:n - 1) = law%stiffness*theta
       moment(n) = 0.0_wp
+      call put_at(law%held, theta, moment)
       if (.not. law%has_damping) return
       call openings(n, .false., angle_rate, theta)
       call law%series%solve(theta)
       theta = law%damping*theta
+      call clear_at(law%held, theta)
       call law%series%solve_transposed(theta)
       moment(0:n - 1) = moment(0:n - 1) + theta
    end subroutine series_moments
+
+   !> Rotations at which hinges are held leave the right-hand side of the three-moment equation.
+   pure subroutine take_held(law, theta)
+      type(hinge_law), intent(in) :: law
+      real(wp), intent(inout) :: theta(0:)
+      integer :: i
+      do i = 1, size(law%held)
+         theta(law%held(i)) = theta(law%held(i)) - law%held_at(i)
+      end do
+   end subroutine take_held
+
+   !> moment(k) = solution(k) for hinges whose moment is the unknown of the three-moment equation.
+   pure subroutine put_at(hinges, solution, moment)
+      integer, intent(in) :: hinges(:)
+      real(wp), intent(in) :: solution(0:)
+      real(wp), intent(inout) :: moment(0:)
+      integer :: i
+      do i = 1, size(hinges)
+         moment(hinges(i)) = solution(hinges(i))
+      end do
+   end subroutine put_at
+
+   !> rate(k) = 0 for hinges that are held.
+   pure subroutine clear_at(hinges, rate)
+      integer, intent(in) :: hinges(:)
+      real(wp), intent(inout) :: rate(0:)
+      integer :: i
+      do i = 1, size(hinges)
+         rate(hinges(i)) = 0.0_wp
+      end do
+   end subroutine clear_at
 
    !> Quasistatic bending with the rotations of the damped hinges as states: their moments, and the rotations
    !> of the others, solve one system.
@@ -184,10 +252,11 @@ contains
 
       call openings(n, .false., angle, theta)
       if (law%has_kinks) theta = theta - law%kink
+      call take_held(law, theta)
       call moments_of_series(law, n, theta, angle(n + 1:n + size(law%relaxing)), moment)
    end subroutine relaxing_moments
 
-   !> T(0:n) from openings (in `theta`) and given rotations of the relaxing hinges.
+   !> T(0:n) from openings (in `theta`, less what is held) and given rotations of the relaxing hinges.
    pure subroutine moments_of_series(law, n, theta, given, moment)
       type(hinge_law), intent(in) :: law
       integer, intent(in) :: n
@@ -202,12 +271,11 @@ contains
       call law%series%solve(theta)
       moment(0:n - 1) = law%stiffness*theta
       moment(n) = 0.0_wp
-      do i = 1, size(given)
-         moment(law%relaxing(i)) = theta(law%relaxing(i))
-      end do
+      call put_at(law%relaxing, theta, moment)
+      call put_at(law%held, theta, moment)
    end subroutine moments_of_series
 
-   !> th' = (T - C th)/D of the relaxing hinges; linear, so it serves changes as well.
+   !> th' = (T - C th)/D of the relaxing hinges, 0 of locked ones; linear, so it serves changes as well.
    pure subroutine relaxation_rates(law, moment, theta, theta_rate)
       type(hinge_law), intent(in) :: law
       real(wp), intent(in) :: moment(0:)      !! T (0:n) [N m]
@@ -218,6 +286,7 @@ contains
       do i = 1, size(law%relaxing)
          k = law%relaxing(i)
          theta_rate(i) = (moment(k) - law%stiffness(k)*theta(i))/law%damping(k)
+         if (law%locked(k)) theta_rate(i) = 0.0_wp
       end do
    end subroutine relaxation_rates
 
@@ -270,10 +339,15 @@ contains
             return
          end if
       end associate
+      call take_held(law, theta)
       call law%series%solve(theta)
       call law%series%solve(theta_rate)
       moment(0:n - 1) = law%stiffness*theta
       moment_rate(0:n - 1) = law%stiffness*theta_rate
+      call put_at(law%held, theta, moment)
+      call put_at(law%held, theta_rate, moment_rate)
+      theta(law%held) = law%held_at
+      call clear_at(law%held, theta_rate)
    end subroutine hinge_state
 
    !> The same with relaxing hinges; on entry theta and theta_rate hold the openings and their rates.
@@ -285,9 +359,11 @@ contains
       real(wp), intent(out) :: moment(0:n), moment_rate(0:n)
       real(wp) :: rate(size(given))
 
+      call take_held(law, theta)
       call moments_of_series(law, n, theta, given, moment)
       call relaxation_rates(law, moment, given, rate)
       call moments_of_series(law, n, theta_rate, rate, moment_rate)
+      theta(law%held) = law%held_at
       theta(law%relaxing) = given
       theta_rate = 0.0_wp
       theta_rate(law%relaxing) = rate
@@ -303,9 +379,11 @@ contains
 
       call openings(n, flexible, angle_rate, theta_rate)
       if (law%quasistatic) call law%series%solve(theta_rate)
+      call clear_at(law%held, theta_rate)
    end subroutine hinge_rates
 
-   !> Change of the hinge moments for a change of angles and rates (the law is linear but for the kinks).
+   !> Change of the hinge moments for a change of angles and rates (the law is linear but for the kinks). Reactions of
+   !> locked hinges are left out where the kernels find them.
    pure subroutine hinge_tangent(law, n, flexible, d_angle, d_angle_rate, work, d_moment)
       type(hinge_law), intent(in) :: law
       integer, intent(in) :: n
@@ -322,12 +400,17 @@ contains
       if (law%quasistatic) call law%series%solve(work)
       d_moment(0:n - 1) = law%stiffness*work
       d_moment(n) = 0.0_wp
-      if (.not. law%has_damping) return
-      call openings(n, flexible, d_angle_rate, work)
-      if (law%quasistatic) call law%series%solve(work)
-      work = law%damping*work
-      if (law%quasistatic) call law%series%solve_transposed(work)
-      d_moment(0:n - 1) = d_moment(0:n - 1) + work
+      call put_at(law%held, work, d_moment)
+      if (law%has_damping) then
+         call openings(n, flexible, d_angle_rate, work)
+         if (law%quasistatic) call law%series%solve(work)
+         work = law%damping*work
+         call clear_at(law%held, work)
+         if (law%quasistatic) call law%series%solve_transposed(work)
+         d_moment(0:n - 1) = d_moment(0:n - 1) + work
+      end if
+      if (law%quasistatic .or. .not. law%has_locks) return
+      where (law%locked) d_moment(0:n - 1) = 0.0_wp
    end subroutine hinge_tangent
 
 end module rodyn_hinge_law

@@ -1,0 +1,111 @@
+!> Locked hinges as a change of coordinates, for code that works with whole matrices.
+!>
+!> The opening of a locked hinge is given. Between rods with inertia or rigid ones that makes one angle redundant,
+!>     phi_{k+1} = phi_k + beta_k - alpha_{k+1} + opening_k                 (alpha, beta: with dynamic bending)
+!> which is linear: with z the other coordinates, dq = T dz. `reduce` applies T^T to forces, `expand` applies T to changes,
+!> and a symmetric matrix becomes T^T M T; all keep their size, with zeros (ones on the diagonal of M) for what is slaved.
+!> With quasistatic bending nothing is redundant: see `rodyn_hinge_law`.
+module rodyn_locks
+   use rodyn_kinds, only: wp
+   use rodyn_scene, only: scene_type
+   implicit none (type, external)
+   private
+   public :: has_slaves, reduce, expand, reduce_matrix, free_coordinates, reactions
+
+contains
+
+   !> Some chord angle follows from others.
+   pure logical function has_slaves(scene)
+      type(scene_type), intent(in) :: scene
+      has_slaves = scene%hinges%has_locks .and. .not. scene%quasistatic
+   end function has_slaves
+
+   !> x <- T^T x (generalised forces), zero where a coordinate is slaved.
+   pure subroutine reduce(scene, x)
+      type(scene_type), intent(in) :: scene
+      real(wp), intent(inout) :: x(:) !! (n_dof)
+      real(wp) :: force
+      integer :: k
+
+      do k = scene%n, 1, -1
+         if (.not. scene%hinges%locked(k - 1)) cycle
+         force = x(scene%phi_at() + k)
+         x(scene%phi_at() + k) = 0.0_wp
+         if (k > 1) x(scene%phi_at() + k - 1) = x(scene%phi_at() + k - 1) + force
+         if (.not. scene%dynamic_bending) cycle
+         x(scene%alpha_at() + k) = x(scene%alpha_at() + k) - force
+         if (k > 1) x(scene%beta_at() + k - 1) = x(scene%beta_at() + k - 1) + force
+      end do
+   end subroutine reduce
+
+   !> Set slaved coordinates (or rates, or accelerations) by those of the others and the openings (likewise).
+   pure subroutine expand(scene, locked, opening, x)
+      type(scene_type), intent(in) :: scene
+      logical, intent(in) :: locked(0:)   !! which are locked: those of the scene, or those that will be (0:n-1)
+      real(wp), intent(in) :: opening(0:) !! of locked hinges (0:n-1)
+      real(wp), intent(inout) :: x(:)     !! (n_dof)
+      real(wp) :: outer
+      integer :: k
+
+      outer = 0.0_wp ! end tangent of rod k - 1
+      do k = 1, scene%n
+         associate (phi => x(scene%phi_at() + k))
+            if (locked(k - 1)) then
+               phi = outer + opening(k - 1)
+               if (scene%dynamic_bending) phi = phi - x(scene%alpha_at() + k)
+            end if
+            outer = phi
+            if (scene%dynamic_bending) outer = outer + x(scene%beta_at() + k)
+         end associate
+      end do
+   end subroutine expand
+
+   !> Matrix <- T^T matrix T, with `diagonal` where a coordinate is slaved.
+   pure subroutine reduce_matrix(scene, diagonal, matrix)
+      type(scene_type), intent(in) :: scene
+      real(wp), intent(in) :: diagonal        !! 1 keeps a mass matrix positive definite
+      real(wp), intent(inout) :: matrix(:, :) !! symmetric, both triangles (n_dof, n_dof)
+      integer :: j, k
+
+      do j = 1, scene%n_dof
+         call reduce(scene, matrix(:, j))
+      end do
+      do j = 1, scene%n_dof
+         call reduce(scene, matrix(j, :))
+      end do
+      do k = 1, scene%n
+         associate (i => scene%phi_at() + k)
+            if (scene%hinges%locked(k - 1)) matrix(i, i) = diagonal
+         end associate
+      end do
+   end subroutine reduce_matrix
+
+   !> Indices of the coordinates that are not slaved.
+   pure function free_coordinates(scene) result(list)
+      type(scene_type), intent(in) :: scene
+      integer, allocatable :: list(:)
+      logical :: free(scene%n_dof)
+      integer :: i
+
+      free = .true.
+      free(scene%phi_at() + 1:scene%phi_at() + scene%n) = .not. (scene%hinges%locked .and. has_slaves(scene))
+      list = pack([(i, i=1, scene%n_dof)], free)
+   end function free_coordinates
+
+   !> Moments of locked hinges from what the motion lacks without them, M p' - forces = sum -T_k d(opening_k)/dq: turning
+   !> all rods beyond hinge k opens that hinge alone.
+   pure subroutine reactions(scene, lacking, moment)
+      type(scene_type), intent(in) :: scene
+      real(wp), intent(in) :: lacking(:)    !! (n_dof) [N m in rows of angles]
+      real(wp), intent(inout) :: moment(0:) !! T of locked hinges (0:n) [N m]
+      real(wp) :: turning
+      integer :: k
+
+      turning = 0.0_wp
+      do k = scene%n, 1, -1
+         turning = turning + lacking(scene%phi_at() + k)
+         if (scene%hinges%locked(k - 1)) moment(k - 1) = -turning
+      end do
+   end subroutine reactions
+
+end module rodyn_locks
