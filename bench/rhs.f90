@@ -27,7 +27,7 @@ program bench_rhs
    type(case_config) :: config
    integer :: i, round
 
-   allocate (subjects(22))
+   allocate (subjects(25))
    i = 0
    call add('n = 4, consistent, recursive', standard(4))
    config = standard(4)
@@ -62,6 +62,9 @@ program bench_rhs
    call add('n = 4, rigid rods, lumped', config)
    config%model%bending = 'quasistatic'
    call add('n = 4, quasistatic, lumped', config)
+   call add('n = 4, hinge 2 locked', standard(4), locked=[3])
+   call add('n = 4, rigid rods, hinge 2 locked', rigid(4), locked=[3])
+   call add('n = 1024, every other hinge locked', standard(1024), locked=[(round, round=1, 1024, 2)])
    do round = 1, size(chain_sizes)
       call add('', standard(chain_sizes(round)))
       write (subjects(i)%name, '("chain of ", i0)') chain_sizes(round)
@@ -110,10 +113,20 @@ contains
       allocate (c%loads(0))
    end function standard
 
-   subroutine add(name, c, ledger)
+   !> The same with rods that do not bend.
+   function rigid(n) result(c)
+      integer, intent(in) :: n
+      type(case_config) :: c
+      c = standard(n)
+      c%model%bending = 'rigid'
+   end function rigid
+
+   subroutine add(name, c, ledger, locked)
       character(len=*), intent(in) :: name
       type(case_config), intent(in) :: c
       logical, intent(in), optional :: ledger
+      integer, intent(in), optional :: locked(:) !! rods whose inner hinges are locked
+      logical :: locks(c%chain%n_rods)
       type(scene_type) :: scene
       type(error_type), allocatable :: error
       logical :: with_ledger
@@ -128,6 +141,11 @@ contains
       if (allocated(error)) error stop error%message
       call subjects(i)%motion%dynamics%set_regime(0.0_wp, 1.0_wp)
       call initial_state(subjects(i)%motion, c%initial, subjects(i)%y)
+      if (present(locked)) then
+         locks = .false.
+         locks(locked) = .true.
+         call subjects(i)%motion%dynamics%set_locked(locks, spread(0.0_wp, 1, size(locks)))
+      end if
       subjects(i)%repeats = max(3, 20000/c%chain%n_rods/merge(10, 1, c%model%kernel == 'assembled'))
       allocate (subjects(i)%nanoseconds(n_rounds))
    end subroutine add

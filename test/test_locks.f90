@@ -32,6 +32,7 @@ contains
          new_test('latching keeps the momenta and loses what it says', test_momenta), &
          new_test('latching of rods of every kind solves the dense impact', test_impact), &
          new_test('1000 rods latch and move as one', test_long_chain), &
+         new_test('both kernels agree on 200 rods with locks', test_kernels_agree), &
          new_test('quasistatic bending: locks are the limit of stiff springs', test_quasistatic_limit), &
          new_test('quasistatic bending: locking changes no acceleration but the dampers''', test_quasistatic_latch), &
          new_test('a locked hinge is the limit of a stiff, damped one', test_stiff_limit), &
@@ -463,6 +464,45 @@ contains
          end associate
       end do
    end subroutine test_long_chain
+
+   !> A long curled chain, every third hinge locked: rounding grows with the mass that a rod carries.
+   subroutine test_kernels_agree(error)
+      type(error_type), allocatable, intent(out) :: error
+      integer, parameter :: n = 200, kinds(3) = [1, 3, 5]
+      character(len=9), parameter :: kernels(2) = ['recursive', 'assembled']
+      type(case_config) :: config
+      type(motion_type) :: motion
+      real(wp), allocatable :: y(:), a(:, :), still(:), moments(:, :)
+      real(wp) :: scale
+      logical :: ok
+      integer :: i, k, kernel
+
+      do i = 1, size(kinds)
+         call seed_random(24)
+         call random_case(config, kinds(i), n)
+         config%initial%phi = [(0.05_wp*k + uniform(-0.3_wp, 0.3_wp), k=1, n)]
+         do kernel = 1, 2
+            config%model%kernel = kernels(kernel)
+            call motion_of(motion, y, config, error)
+            if (allocated(error)) return
+            if (kernel == 1) allocate (a(motion%n_dof, 2), moments(0:n, 2), still(n))
+            still = 0.0_wp
+            call motion%dynamics%set_locked([(mod(k, 3) == 0, k=1, n)], still)
+            call motion%dynamics%accelerations(0.3_wp, y(:motion%n_q), y(motion%n_q + 1:2*motion%n_q), a(:, kernel), ok)
+            moments(:, kernel) = motion%dynamics%work%moment
+            call check(error, ok, 'no accelerations')
+            if (allocated(error)) return
+         end do
+         scale = maxval(abs(a(:, 2)))
+         call check(error, maxval(abs(a(:, 1) - a(:, 2))) < 2.0e-11_wp*scale, kind_name(kinds(i))//': accelerations')
+         if (allocated(error)) return
+         ! The assembled kernel has moments as what is left of M p' - forces, to the rounding of M p' (M to some 100 kg m^2).
+         scale = maxval(abs(moments)) + 0.1_wp*scale
+         call check(error, maxval(abs(moments(:, 1) - moments(:, 2))) < 1.0e-11_wp*scale, kind_name(kinds(i))//': moments')
+         if (allocated(error)) return
+         deallocate (a, moments, still)
+      end do
+   end subroutine test_kernels_agree
 
    !> A lock at th against a spring of stiffness C whose kink is moved there: differences fall with 1/C.
    subroutine test_quasistatic_limit(error)
