@@ -8,6 +8,7 @@
 !>     if (.not. allocated(error)) call run_case(config, 'table1.h5', error, input_text=text)
 !>     if (allocated(error)) print *, error%message
 !>
+!> Forces of your own: extend `user_load` and hand it to `run_case` (docs/moving_scenes.md).
 !> For more than whole runs: `new_scene` compiles a case, `new_motion` makes its equations y' = f(t, y).
 module rodyn
    use rodyn_kinds, only: wp
@@ -18,11 +19,13 @@ module rodyn
    use rodyn_motion, only: motion_type, new_motion, initial_state
    use rodyn_frequencies, only: natural_frequencies
    use rodyn_run, only: run_case
+   use rodyn_user_load, only: user_load
    use rodyn_build_info, only: program_version
    implicit none (type, external)
    private
    public :: wp, error_type
    public :: case_config, load_config, read_case, parse_case, resolved_case, default_case, run_case
    public :: scene_type, new_scene, motion_type, new_motion, initial_state, natural_frequencies
+   public :: user_load
    public :: program_version
 end module rodyn

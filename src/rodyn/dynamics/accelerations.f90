@@ -7,6 +7,8 @@ module rodyn_accelerations
    use rodyn_trigonometry, only: sine_cosine
    use rodyn_hinge_law, only: hinge_moments, hinge_state, openings
    use rodyn_loads, only: load_regime, load_forces, new_load_regime, evaluate_loads
+   use rodyn_kink_program, only: kink_regime, new_kink_regime, evaluate_kinks
+   use rodyn_user_load, only: user_load
    use rodyn_recursion_flexible, only: flexible_accelerations
    use rodyn_recursion_rigid, only: rigid_accelerations
    use rodyn_recursion_lumped, only: lumped_accelerations
@@ -34,13 +36,22 @@ module rodyn_accelerations
       type(load_forces) :: forces      !! their values
       integer :: path = path_flexible  !! which kernel
       logical :: needs_moments = .true. !! the kernel does not form them itself
-      logical :: varying = .false.     !! some load changes within the regime
+      logical :: varying = .false.     !! some load or kink changes within the regime
+      type(kink_regime) :: kinks       !! programs of kinks that move between the last switch and the next
+      logical :: driven = .false.      !! there are some
+      real(wp), allocatable, dimension(:) :: kink, kink_rate, kink_acceleration !! (0:n-1); allocated if the scene has programs
+      class(user_load), pointer :: user => null() !! not owned
+      real(wp), allocatable :: zero(:) !! (n_q); allocated if the assembled kernel needs moments at rest
       type(lane_scene), allocatable :: group !! the scene in every lane; allocated when first needed
       type(lane_work) :: group_work
       logical :: group_is_current = .false.  !! its forces are those of the regime
       real(wp), allocatable, dimension(:) :: lane_q, lane_p, lane_rates !! of one lane (n_dof), where lanes have no kernel
    contains
       procedure :: set_regime
+      procedure :: refresh
+      procedure :: move_kinks
+      procedure :: change_hinges
+      procedure :: strike
       procedure :: set_locked
       procedure :: project_locked
       procedure :: hinge_rotations
@@ -61,6 +72,11 @@ contains
       dynamics%scene = scene
       call new_workspace(dynamics%work, scene)
       allocate (dynamics%forces%node(2, 0))
+      if (scene%hinges%driven) then
+         allocate (dynamics%kink(0:scene%n - 1), dynamics%kink_rate(0:scene%n - 1), dynamics%kink_acceleration(0:scene%n - 1), &
+                   source=0.0_wp)
+         call new_kink_regime(dynamics%kinks, scene%kinks, 0.0_wp, 0.0_wp)
+      end if
       allocate (dynamics%opening_acceleration(0:scene%n - 1), source=0.0_wp)
       call choose_path(dynamics, error)
    end subroutine new_dynamics
@@ -73,8 +89,10 @@ contains
       self%needs_moments = .true.
       if (self%scene%assembled) then
          self%path = path_assembled
-         self%needs_moments = size(self%scene%hinges%relaxing) > 0 .or. self%scene%hinges%has_locks
          call new_assembled_system(self%system, self%scene, error)
+         self%needs_moments = size(self%scene%hinges%relaxing) > 0 .or. self%system%moving .or. self%scene%hinges%has_locks
+         if (size(self%scene%hinges%relaxing) == 0 .and. self%system%moving .and. .not. allocated(self%zero)) &
+            allocate (self%zero(self%scene%n_q), source=0.0_wp)
       else if (has_slaves(self%scene)) then
          self%path = path_joints
          if (.not. allocated(self%joints)) allocate (self%joints)
@@ -89,16 +107,98 @@ contains
       end if
    end subroutine choose_path
 
-   !> Make the loads between two neighbouring switch times act.
+   !> Make the loads between two neighbouring switch times act, and the kinks move as they do then.
    subroutine set_regime(self, t_from, t_to)
       class(dynamics_type), intent(inout) :: self
       real(wp), intent(in) :: t_from, t_to !! [s]
 
       call new_load_regime(self%regime, self%scene%loads, t_from, t_to, self%scene%n)
+      if (associated(self%user)) call make_room_for_user(self)
       call evaluate_loads(self%forces, self%regime, t_from, fresh=.true.)
-      self%varying = size(self%regime%varying) > 0
       self%group_is_current = .false.
+      self%driven = .false.
+      if (self%scene%hinges%driven) then
+         call new_kink_regime(self%kinks, self%scene%kinks, t_from, t_to)
+         self%driven = size(self%kinks%moving) > 0
+         call self%move_kinks(t_from)
+      end if
+      self%varying = size(self%regime%varying) > 0 .or. self%driven .or. associated(self%user)
    end subroutine set_regime
+
+   !> Forces on nodes for a load of the user's.
+   subroutine make_room_for_user(self)
+      type(dynamics_type), intent(inout) :: self
+      if (.not. self%user%on_nodes .or. self%regime%on_nodes) return
+      self%regime%on_nodes = .true.
+      deallocate (self%regime%constant_node)
+      allocate (self%regime%constant_node(2, self%scene%n), source=0.0_wp)
+   end subroutine make_room_for_user
+
+   !> All that changes with time, and the user's load with the state. Allocates nothing.
+   subroutine refresh(self, t, q, p)
+      class(dynamics_type), intent(inout) :: self
+      real(wp), intent(in) :: t !! [s]
+      real(wp), intent(in) :: q(self%scene%n_q), p(self%scene%n_dof)
+
+      if (self%driven) call self%move_kinks(t)
+      if (associated(self%user)) then
+         self%forces%base(:) = self%regime%constant_base
+         self%forces%node(:, :) = self%regime%constant_node
+      end if
+      call evaluate_loads(self%forces, self%regime, t, fresh=.false.)
+      if (associated(self%user)) call self%user%add_forces(self%scene, t, q, p, self%forces%base, self%forces%node)
+   end subroutine refresh
+
+   !> What hinges that have just been locked do to the rates: `velocity_jump` of all locked hinges, each with the rate of its
+   !> kink afterwards.
+   subroutine strike(self, q, p, lost, worked, ok)
+      class(dynamics_type), intent(inout) :: self
+      real(wp), intent(in) :: q(:)
+      real(wp), intent(inout) :: p(:)
+      real(wp), intent(out) :: lost   !! energy [J]
+      real(wp), intent(out) :: worked !! by the drives of locked hinges [J]
+      logical, intent(out) :: ok      !! false: not finite, or M not positive definite
+      real(wp) :: after(size(p)), impulse(0:self%scene%n - 1)
+
+      call self%velocity_jump(q, p, self%scene%hinges%locked, self%scene%hinges%kink_rate, after, lost, impulse, ok)
+      worked = sum(impulse*self%scene%hinges%kink_rate)
+      p = after
+   end subroutine strike
+
+   !> Put the kinks where they are at time t.
+   subroutine move_kinks(self, t)
+      class(dynamics_type), intent(inout) :: self
+      real(wp), intent(in) :: t !! [s], within the regime
+
+      if (.not. allocated(self%kink)) return
+      call evaluate_kinks(self%kinks, t, self%kink, self%kink_rate, self%kink_acceleration)
+      call self%scene%hinges%set_kinks(self%kink, self%kink_rate)
+      self%opening_acceleration(:) = self%kink_acceleration
+   end subroutine move_kinks
+
+   !> Make the present laws of the mechanisms act.
+   subroutine change_hinges(self, error)
+      class(dynamics_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out), optional :: error !! no memory for the assembled system
+      type(error_type), allocatable :: failure
+      logical :: locked(0:self%scene%n - 1)
+      real(wp) :: held_at(0:self%scene%n - 1)
+      integer :: i
+
+      call self%scene%hinges%set_mechanisms()
+      locked = .false.
+      held_at = 0.0_wp
+      do i = 1, size(self%scene%hinges%mechanisms)
+         associate (mechanism => self%scene%hinges%mechanisms(i))
+            locked(mechanism%hinge) = mechanism%is_constrained()
+            held_at(mechanism%hinge) = mechanism%lock_angle
+         end associate
+      end do
+      call self%set_locked(locked, self%opening_acceleration, held_at, failure)
+      if (allocated(self%group)) deallocate (self%group)
+      self%group_is_current = .false.
+      if (present(error)) call move_alloc(failure, error)
+   end subroutine change_hinges
 
    !> Lock these hinges and free all others: from now on the accelerations keep (opening_k)'' as prescribed where a hinge
    !> is locked, and `work%moment(k)` is all of the moment that it passes. Cheap where the set stays the same; then
@@ -113,7 +213,8 @@ contains
       type(error_type), allocatable :: failure
       real(wp) :: held(0:self%scene%n - 1)
 
-      self%opening_acceleration(:) = opening_acceleration
+      held = opening_acceleration ! may be the component itself
+      self%opening_acceleration(:) = held
       associate (law => self%scene%hinges)
          if (all(locked .eqv. law%locked) .and. .not. present(theta)) return
          held = 0.0_wp
@@ -204,10 +305,15 @@ contains
       logical, intent(out) :: ok               !! false: not finite, or M not positive definite
 
       associate (scene => self%scene, work => self%work, first => self%scene%n_base + 1)
-         if (self%varying) call evaluate_loads(self%forces, self%regime, t, fresh=.false.)
+         if (self%varying) call self%refresh(t, q, p)
          call sine_cosine(scene%n, q(first), work%sine(1:), work%cosine(1:))
-         if (self%needs_moments) &
-            call hinge_moments(scene%hinges, scene%n, scene%dynamic_bending, q(first), p(first), work%theta, work%moment)
+         if (self%needs_moments) then
+            if (allocated(self%zero)) then
+               call hinge_moments(scene%hinges, scene%n, scene%dynamic_bending, self%zero, self%zero, work%theta, work%moment)
+            else
+               call hinge_moments(scene%hinges, scene%n, scene%dynamic_bending, q(first), p(first), work%theta, work%moment)
+            end if
+         end if
          select case (self%path)
          case (path_flexible)
             call flexible_accelerations(scene%n, scene%n_base, scene%rods, scene%rod_of, scene%node_mass, scene%body, &
@@ -242,7 +348,7 @@ contains
       logical, intent(out) :: ok                              !! false: not in every lane
       logical :: lane_ok(lanes)
 
-      if (.not. suits_lanes(self%scene)) then
+      if (.not. suits_lanes(self%scene) .or. associated(self%user)) then
          call one_by_one(self, t, q, p, acceleration, ok)
          return
       end if
@@ -251,7 +357,7 @@ contains
       ok = all(lane_ok)
    end subroutine lane_accelerations
 
-   !> Lane after lane, for the assembled kernel and for locked hinges.
+   !> Lane after lane, for the assembled kernel, for locked hinges and what else has no lanes.
    subroutine one_by_one(self, t, q, p, acceleration, ok)
       class(dynamics_type), intent(inout) :: self
       real(wp), intent(in) :: t(lanes)
@@ -286,6 +392,12 @@ contains
       self%group%loaded = self%regime%on_nodes
       do i = 1, lanes
          if (self%varying) call evaluate_loads(self%forces, self%regime, t(i), fresh=.false.)
+         if (self%scene%hinges%driven) then
+            call self%move_kinks(t(i))
+            do k = 0, self%scene%n - 1
+               self%group%kink_moment(i, k) = self%scene%hinges%offset(k)
+            end do
+         end if
          self%group%base_force(i, :) = self%forces%base
          if (.not. self%regime%on_nodes) cycle
          do k = 1, self%scene%n ! an array assignment would make a copy first

@@ -29,6 +29,7 @@ module rodyn_assembled
       real(wp), allocatable :: outboard(:)  !! mass beyond rod k (0:n) [kg]
       logical :: damped = .false.       !! D is not zero
       logical :: kinked = .false.       !! Q2 is not zero
+      logical :: moving = .false.       !! Q2 changes: it is made of the moments of openings and rates that are zero
    end type assembled_system
 
 contains
@@ -55,6 +56,7 @@ contains
          return
       end if
       system%damped = scene%hinges%has_damping
+      system%moving = scene%hinges%driven .or. size(scene%hinges%mechanisms) > 0
       call joint_map(scene, b)
       r = 0.0_wp ! th = r q - r_gamma
       c = b
@@ -147,6 +149,7 @@ contains
       real(wp), intent(in) :: sine(0:), cosine(0:) !! of phi (0:n)
       real(wp), intent(in) :: q(:), p(:)           !! coordinates and rates (dof)
       real(wp), intent(inout) :: moment(0:)        !! hinge moments (0:n), used if hinges relax: T is then no K q + D p;
+                                                   !! of zero openings and rates, if hinges move;
                                                    !! those of locked hinges are results unless bending is quasistatic
       real(wp), intent(in) :: opening_acceleration(0:) !! of locked hinges, given (0:n-1) [rad/s^2]
       real(wp), intent(in) :: base_force(3)        !! X_C, Y_C, M_C
@@ -169,7 +172,11 @@ contains
             acceleration(first:) = acceleration(first:) + moment(1:n) - moment(0:n - 1)
          end associate
       else
-         if (system%kinked) acceleration = acceleration + system%q2
+         if (system%moving) then
+            call add_moments(scene, moment, acceleration)
+         else if (system%kinked) then
+            acceleration = acceleration + system%q2
+         end if
          call dgemv('N', n_dof, n_dof, -1.0_wp, system%k, n_dof, q, 1, 1.0_wp, acceleration, 1)
          if (system%damped) call dgemv('N', n_dof, n_dof, -1.0_wp, system%d, n_dof, p, 1, 1.0_wp, acceleration, 1)
       end if
@@ -183,6 +190,27 @@ contains
       call dpotrs('L', n_dof, 1, system%m, n_dof, acceleration, n_dof, info)
       ok = info == 0 .and. all(ieee_is_finite(acceleration))
    end subroutine assembled_accelerations
+
+   !> Forces of moments T(0:n) in the hinges, T(n) = 0, but those of locked hinges that `solve_locked` finds.
+   pure subroutine add_moments(scene, moment, force)
+      type(scene_type), intent(in) :: scene
+      real(wp), intent(in) :: moment(0:)
+      real(wp), intent(inout) :: force(:)
+      real(wp) :: inner, outer
+      integer :: k
+
+      outer = 0.0_wp
+      do k = scene%n, 1, -1
+         inner = moment(k - 1)
+         if (scene%hinges%locked(k - 1) .and. .not. scene%quasistatic) inner = 0.0_wp
+         force(scene%phi_at() + k) = force(scene%phi_at() + k) + outer - inner
+         if (scene%dynamic_bending) then
+            force(scene%alpha_at() + k) = force(scene%alpha_at() + k) - inner
+            force(scene%beta_at() + k) = force(scene%beta_at() + k) + outer
+         end if
+         outer = inner
+      end do
+   end subroutine add_moments
 
    !> The same with locked hinges: with p' = T z + a, a the part that is given, T^T M T z = T^T (forces - M a). N and its
    !> z are used up.

@@ -2,7 +2,7 @@
 module rodyn_kinematics
    use rodyn_kinds, only: wp
    use rodyn_scene, only: scene_type
-   use rodyn_hinge_law, only: hinge_state, hinge_rates, openings
+   use rodyn_hinge_law, only: hinge_state, hinge_rates, spring_energy
    use rodyn_three_moments, only: slopes_from_moments
    implicit none (type, external)
    private
@@ -141,7 +141,7 @@ contains
          call hinge_state(scene%hinges, scene%n, scene%dynamic_bending, q(first:), p(first:), theta, theta_rate, &
                           moment, moment_rate)
       end associate
-      elastic_energy = 0.5_wp*sum(scene%hinges%stiffness*theta**2)
+      elastic_energy = spring_energy(scene%hinges, theta)
       if (.not. (scene%dynamic_bending .or. scene%quasistatic)) return
       call slopes(scene, q, p, alpha, beta, alpha_rate, beta_rate)
       do k = 1, scene%n
@@ -177,7 +177,7 @@ contains
       end associate
    end subroutine slopes
 
-   !> Power that the dampers take, sum D th'^2 [W].
+   !> Power that dampers and sliding friction take, sum D th'^2 + f th' [W].
    pure real(wp) function dissipated_power(scene, q, p)
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: q(:), p(:)
@@ -185,15 +185,12 @@ contains
       real(wp), dimension(0:scene%n) :: moment, moment_rate
 
       dissipated_power = 0.0_wp
-      if (.not. scene%hinges%has_damping) return
+      if (.not. (scene%hinges%has_damping .or. scene%hinges%has_friction)) return
       associate (first => scene%n_base + 1)
-         if (scene%quasistatic) then
-            call hinge_state(scene%hinges, scene%n, .false., q(first:), p(first:), theta, theta_rate, moment, moment_rate)
-         else
-            call openings(scene%n, scene%dynamic_bending, p(first:), theta_rate)
-         end if
+         call hinge_state(scene%hinges, scene%n, scene%dynamic_bending, q(first:), p(first:), theta, theta_rate, &
+                          moment, moment_rate)
       end associate
-      dissipated_power = sum(scene%hinges%damping*theta_rate**2)
+      dissipated_power = sum((scene%hinges%damping*theta_rate + scene%hinges%friction)*theta_rate)
    end function dissipated_power
 
    !> The same with memory of the caller's, for the right-hand side of scenes without relaxing hinges.
@@ -205,10 +202,14 @@ contains
       integer :: k
 
       power = 0.0_wp
-      if (.not. scene%hinges%has_damping) return
+      if (.not. (scene%hinges%has_damping .or. scene%hinges%has_friction)) return
       call hinge_rates(scene%hinges, scene%n, scene%dynamic_bending, p(scene%n_base + 1:), rate)
       do k = 0, scene%n - 1
          power = power + scene%hinges%damping(k)*rate(k)**2
+      end do
+      if (.not. scene%hinges%has_friction) return
+      do k = 0, scene%n - 1
+         power = power + scene%hinges%friction(k)*rate(k)
       end do
    end subroutine damper_power
 

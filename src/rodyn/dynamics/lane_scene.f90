@@ -33,7 +33,7 @@ module rodyn_lane_scene
       real(wp), allocatable :: stiffness(:, :) !! C (lanes, 0:n-1) [N m/rad]
       real(wp), allocatable :: damping(:, :)   !! D (lanes, 0:n-1) [N m s/rad]
       real(wp), allocatable :: kink(:, :)      !! gamma (lanes, 0:n-1) [rad]
-      real(wp), allocatable :: kink_moment(:, :) !! C gamma (lanes, 0:n-1) [N m]
+      real(wp), allocatable :: kink_moment(:, :) !! moment at rest with all openings zero (`rodyn_hinge_law`) (lanes, 0:n-1) [N m]
       real(wp), allocatable, dimension(:, :) :: lower, pivot, upper !! factors of `rodyn_three_moments` (lanes, 0:n-1), if `series`
       real(wp), dimension(lanes) :: mass = 1.0_wp, inertia = 1.0_wp, hinge_x = 0.0_wp, hinge_y = 0.0_wp !! of the spacecraft
       real(wp), allocatable :: base_force(:, :)    !! X_C, Y_C, M_C (lanes, 3), moving axes
@@ -46,6 +46,7 @@ contains
    pure logical function suits_lanes(scene)
       type(scene_type), intent(in) :: scene
       suits_lanes = .not. scene%assembled .and. size(scene%hinges%relaxing) == 0 .and. .not. scene%hinges%has_locks
+      if (scene%quasistatic) suits_lanes = suits_lanes .and. .not. scene%hinges%driven .and. size(scene%hinges%mechanisms) == 0
    end function suits_lanes
 
    !> May these scenes, each of which suits lanes, stand side by side? They must not make each other compute anything
@@ -109,7 +110,7 @@ contains
       group%stiffness(lane, :) = scene%hinges%stiffness
       group%damping(lane, :) = scene%hinges%damping
       group%kink(lane, :) = scene%hinges%kink
-      group%kink_moment(lane, :) = scene%hinges%stiffness*scene%hinges%kink
+      group%kink_moment(lane, :) = scene%hinges%offset
       group%mass(lane) = scene%body%mass
       group%inertia(lane) = scene%body%inertia
       group%hinge_x(lane) = scene%body%hinge_x

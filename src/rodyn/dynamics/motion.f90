@@ -12,14 +12,15 @@ module rodyn_motion
    use rodyn_trigonometry, only: sine_cosine
    use rodyn_case_config, only: initial_config
    use rodyn_scene, only: scene_type
-   use rodyn_loads, only: evaluate_loads
+   use rodyn_user_load, only: user_load
+   use rodyn_hinge_events, only: event_set, new_event_set
    use rodyn_accelerations, only: dynamics_type, new_dynamics
    use rodyn_assembled, only: assembled_system, new_assembled_system, mass_matrix
    use rodyn_linearisation, only: balance_tangent
    use rodyn_newton, only: newton_type
    use rodyn_locks, only: has_slaves, reduce, expand, reduce_matrix
    use rodyn_kinematics, only: load_power, damper_power, dissipated_power, invariants_type, invariants
-   use rodyn_hinge_law, only: relaxation_rates, initial_joints, hinge_tangent
+   use rodyn_hinge_law, only: hinge_moments, relaxation_rates, relaxation_tangent, initial_joints, hinge_tangent
    use rodyn_lapack, only: dpotrf, dpotrs
    implicit none (type, external)
    private
@@ -35,6 +36,7 @@ module rodyn_motion
       integer :: n_q = 0               !! length of q
       logical :: free = .true.         !! the spacecraft moves
       logical :: ledger = .true.       !! y ends with work and dissipated energy
+      type(event_set) :: events        !! what hinges do, and did
    contains
       procedure :: rhs
       procedure :: jacobian
@@ -44,6 +46,10 @@ module rodyn_motion
       procedure :: quadratures
       procedure :: factorise_newton
       procedure :: solve_newton
+      procedure :: event_functions
+      procedure :: begin_regime
+      procedure :: respond
+      procedure :: set_user_load
    end type motion_type
 
 contains
@@ -64,6 +70,8 @@ contains
       motion%ledger = ledger
       motion%n_controlled = scene%n_q + scene%n_dof
       motion%n_states = motion%n_controlled + merge(2, 0, ledger)
+      call new_event_set(motion%events, scene%hinges)
+      motion%n_events = motion%events%n
    end subroutine new_motion
 
    !> y at t = 0.
@@ -119,18 +127,20 @@ contains
    !> Power of the loads and dissipated power. The loads are those of the last evaluation.
    subroutine powers(self, q, p, joint_rate, power)
       class(motion_type), intent(inout) :: self
-      real(wp), intent(in) :: q(:), p(:)
+      real(wp), contiguous, intent(in) :: q(:), p(:)
       real(wp), intent(in) :: joint_rate(:) !! th' of the relaxing hinges [rad/s]
       real(wp), intent(out) :: power(2)     !! [W]
       integer :: i
 
       power(1) = load_power(self%dynamics%scene, q, p, self%dynamics%forces%base, &
                             self%dynamics%regime%on_nodes, self%dynamics%forces%node)
+      if (self%dynamics%driven) power(1) = power(1) + drive_power(self, q, p)
       if (size(joint_rate) > 0) then
-         associate (d => self%dynamics%scene%hinges%damping, relaxing => self%dynamics%scene%hinges%relaxing)
+         associate (d => self%dynamics%scene%hinges%damping, friction => self%dynamics%scene%hinges%friction, &
+                    relaxing => self%dynamics%scene%hinges%relaxing)
             power(2) = 0.0_wp
             do i = 1, size(joint_rate)
-               power(2) = power(2) + d(relaxing(i))*joint_rate(i)**2
+               power(2) = power(2) + (d(relaxing(i))*joint_rate(i) + friction(relaxing(i)))*joint_rate(i)
             end do
          end associate
       else
@@ -138,10 +148,27 @@ contains
       end if
    end subroutine powers
 
-   !> True unless joints of their own stand behind the coordinates.
+   !> Power of the drives of moving kinks [W]: -sum T gamma'. Overwrites the moments in the workspace with all of T.
+   real(wp) function drive_power(self, q, p)
+      class(motion_type), intent(inout) :: self
+      real(wp), contiguous, intent(in) :: q(:), p(:)
+      integer :: k
+
+      associate (scene => self%dynamics%scene, work => self%dynamics%work, first => self%dynamics%scene%n_base + 1)
+         if (has_slaves(scene)) work%theta(0:) = work%moment(:scene%n - 1) ! the kernel has found those of locked hinges
+         call hinge_moments(scene%hinges, scene%n, scene%dynamic_bending, q(first:), p(first:), work%theta, work%moment)
+         drive_power = 0.0_wp
+         do k = 0, scene%n - 1
+            if (has_slaves(scene) .and. scene%hinges%locked(k)) work%moment(k) = work%theta(k)
+            drive_power = drive_power - work%moment(k)*scene%hinges%kink_rate(k)
+         end do
+      end associate
+   end function drive_power
+
+   !> True unless joints of their own stand behind the coordinates, or hinges change their laws.
    logical function has_lanes(self)
       class(motion_type), intent(in) :: self
-      has_lanes = self%n_q == self%n_dof
+      has_lanes = self%n_q == self%n_dof .and. .not. self%events%watches
    end function has_lanes
 
    !> p' at several times and states at once.
@@ -181,14 +208,138 @@ contains
    subroutine quadratures(self, t, q, p, rate)
       class(motion_type), intent(inout) :: self
       real(wp), intent(in) :: t
-      real(wp), intent(in) :: q(:), p(:)
+      real(wp), contiguous, intent(in) :: q(:), p(:)
       real(wp), intent(out) :: rate(:)
       real(wp) :: none(0)
       associate (dynamics => self%dynamics)
-         if (dynamics%varying) call evaluate_loads(dynamics%forces, dynamics%regime, t, fresh=.false.)
+         if (dynamics%varying) call dynamics%refresh(t, q, p)
       end associate
       call powers(self, q, p, none, rate)
    end subroutine quadratures
+
+   !> Margins of the laws of hinges.
+   subroutine event_functions(self, t, y, values)
+      class(motion_type), intent(inout) :: self
+      real(wp), intent(in) :: t
+      real(wp), contiguous, intent(in) :: y(:)
+      real(wp), contiguous, intent(out) :: values(:)
+      associate (r => self%n_q, m => self%n_dof)
+         call self%events%margins(self%dynamics, t, y(1:r), y(r + 1:r + m), values)
+      end associate
+   end subroutine event_functions
+
+   !> What happens at a time that is known: loads and kinks of the next regime begin to act, hinges are released.
+   subroutine begin_regime(self, t, t_to, t_end, y, error)
+      class(motion_type), intent(inout) :: self
+      real(wp), intent(in) :: t, t_to !! the regime [s]
+      real(wp), intent(in) :: t_end   !! end of the run [s]
+      real(wp), contiguous, intent(inout) :: y(:)
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: lost, before
+      integer :: n_before
+
+      associate (hinges => self%dynamics%scene%hinges, r => self%n_q, m => self%n_dof)
+         if (.not. (hinges%driven .or. self%events%watches)) then
+            call self%dynamics%set_regime(t, t_to)
+            return
+         end if
+         if (t > 0.0_wp) then
+            call self%dynamics%move_kinks(t)
+            lost = 0.0_wp
+            before = energy_of(self, y)
+            n_before = self%events%n_logged
+            if (self%events%watches) call self%events%release_due(self%dynamics, t, y(1:r), y(r + 1:r + m), lost, error)
+            if (self%events%n_logged > n_before) call book_loss(self, before, lost, y)
+            ! A kink that jumps works on the springs, which may change their laws.
+            lost = 0.0_wp
+            before = energy_of(self, y)
+            call self%dynamics%set_regime(t, t_to)
+            if (self%events%watches) call self%events%settle(self%dynamics, t, y(1:r), y(r + 1:r + m), lost, error)
+            if (self%ledger) y(r + m + 1:r + m + 2) = y(r + m + 1:r + m + 2) + [(energy_of(self, y) - before) + lost, lost]
+         else
+            call self%dynamics%set_regime(t, t_to)
+            self%events%span = t_end
+            if (self%events%watches) call self%events%begin(self%dynamics, y(1:r), y(r + 1:r + m), error)
+         end if
+      end associate
+      call forget_hinges(self)
+   end subroutine begin_regime
+
+   !> Kinetic and elastic energy [J].
+   real(wp) function energy_of(self, y)
+      type(motion_type), intent(in) :: self
+      real(wp), intent(in) :: y(:)
+      type(invariants_type) :: values
+      values = state_invariants(self, y)
+      energy_of = values%kinetic + values%elastic
+   end function energy_of
+
+   !> Put the loss of events into the ledger. Between massless rods that bend, joints jump when a lock opens; what
+   !> that costs belongs to the last event.
+   subroutine book_loss(self, before, lost, y)
+      type(motion_type), intent(inout) :: self
+      real(wp), intent(in) :: before !! kinetic and elastic energy [J]
+      real(wp), intent(in) :: lost   !! known so far [J]
+      real(wp), contiguous, intent(inout) :: y(:)
+      real(wp) :: in_jump
+
+      in_jump = 0.0_wp
+      if (self%dynamics%scene%quasistatic) then
+         in_jump = (before - energy_of(self, y)) - lost
+         associate (event => self%events%log(self%events%n_logged))
+            event%energy_lost = event%energy_lost + in_jump
+         end associate
+      end if
+      if (self%ledger) y(self%n_q + self%n_dof + 2) = y(self%n_q + self%n_dof + 2) + (lost + in_jump)
+   end subroutine book_loss
+
+   !> Change what an event changes: laws of hinges, and rates where one becomes a constraint.
+   subroutine respond(self, t, crossed, y, error)
+      class(motion_type), intent(inout) :: self
+      real(wp), intent(in) :: t          !! [s]
+      logical, intent(in) :: crossed(:)  !! event functions that became negative
+      real(wp), contiguous, intent(inout) :: y(:)
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: lost, before, worked
+
+      call self%dynamics%move_kinks(t)
+      before = energy_of(self, y)
+      worked = self%events%worked
+      associate (r => self%n_q, m => self%n_dof)
+         call self%events%respond(self%dynamics, t, y(1:r), y(r + 1:r + m), crossed, lost, error)
+         if (self%ledger) y(r + m + 1) = y(r + m + 1) + (self%events%worked - worked)
+      end associate
+      call book_loss(self, before, lost, y)
+      call forget_hinges(self)
+   end subroutine respond
+
+   !> Drop what was derived from the laws of hinges.
+   subroutine forget_hinges(self)
+      type(motion_type), intent(inout) :: self
+      type(newton_type) :: fresh
+      self%newton = fresh
+      if (allocated(self%modes)) deallocate (self%modes)
+   end subroutine forget_hinges
+
+   !> Let a load of the user's act. Before the run begins.
+   subroutine set_user_load(self, load)
+      class(motion_type), intent(inout) :: self
+      class(user_load), target, intent(inout) :: load !! must outlive the run
+      real(wp), allocatable :: times(:)
+      real(wp) :: next
+
+      self%dynamics%user => load
+      if (.not. allocated(load%switches)) return
+      associate (scene => self%dynamics%scene)
+         times = [scene%switches, pack(load%switches, load%switches > 0.0_wp)]
+         scene%switches = [real(wp) ::]
+         do while (size(times) > 0)
+            next = minval(times)
+            scene%switches = [scene%switches, next]
+            times = pack(times, times > next)
+         end do
+      end associate
+   end subroutine set_user_load
 
    !> Energies and momenta of a state.
    pure function state_invariants(motion, y) result(values)
@@ -305,7 +456,7 @@ contains
 
       associate (scene => self%dynamics%scene, first => self%dynamics%scene%n_base + 1)
          call hinge_tangent(scene%hinges, scene%n, .false., dq(first:), dp(first:), work, moment)
-         call relaxation_rates(scene%hinges, moment, dq(self%n_dof + 1:), column)
+         call relaxation_tangent(scene%hinges, moment, dq(self%n_dof + 1:), column)
       end associate
    end subroutine relaxation_column
 

@@ -81,7 +81,7 @@ contains
                if (k > 1) opening_rate = opening_rate - (p(ip + k - 1) + p(ib + k - 1))
                moment_in = moment_in + hinges%damping(k - 1)*opening_rate
             end if
-            if (hinges%has_kinks) moment_in = moment_in - hinges%stiffness(k - 1)*hinges%kink(k - 1)
+            if (hinges%has_offsets) moment_in = moment_in - hinges%offset(k - 1)
 
             ! Deflection: int m v, its rate, int m v^2 and int m v v'.
             alpha = q(ia + k)

@@ -8,10 +8,11 @@ module rodyn_case_config
    use rodyn_kinds, only: wp
    implicit none (type, external)
    private
-   public :: case_config, spacecraft_config, chain_config, model_config, initial_config, load_config, &
-      solver_config, output_config
+   public :: case_config, spacecraft_config, chain_config, model_config, initial_config, load_config, kink_config, &
+      hinge_config, solver_config, output_config, none_given
    public :: name_length
 
+   real(wp), parameter :: none_given = huge(1.0_wp) !! an angle or time that the case does not have
    integer, parameter :: name_length = 32 !! longest choice word ('distributed', 'sine_squared', ...)
 
    !> &spacecraft
@@ -76,6 +77,38 @@ module rodyn_case_config
       real(wp), allocatable :: values(:)                  !! of table [N] or [N m]
    end type load_config
 
+   !> One &kink_program group
+   type :: kink_config
+      integer :: hinge = 0                      !! 0..n-1
+      character(len=name_length) :: law = 'smooth_step' !! 'ramp', 'smooth_step', 'sine' or 'table'
+      real(wp) :: t_start = 0.0_wp              !! [s]
+      real(wp) :: t_end = 0.0_wp                !! [s]; t_start: a step
+      real(wp) :: value = 0.0_wp                !! change of the kink, or amplitude [rad]
+      real(wp) :: rate = 0.0_wp                 !! of sine [rad/s]
+      real(wp), allocatable :: times(:)         !! of table, increasing [s]
+      real(wp), allocatable :: values(:)        !! of table [rad]
+   end type kink_config
+
+   !> One &hinge group. All angles are joint rotations th, from the kink.
+   type :: hinge_config
+      integer :: hinge = 0                      !! 0..n-1
+      logical :: held = .false.                 !! locked at its initial angle
+      real(wp) :: release_time = none_given     !! [s]
+      integer :: release_after = -1             !! hinge whose latching releases this one; -1: none
+      real(wp) :: rest_angle = 0.0_wp           !! of the spring [rad]
+      real(wp) :: freeplay = 0.0_wp             !! to either side of the rest angle [rad]
+      real(wp) :: freeplay_stiffness = 0.0_wp   !! within it [N m/rad]
+      real(wp) :: lower_stop = none_given       !! [rad]
+      real(wp) :: upper_stop = none_given       !! [rad]
+      real(wp) :: stop_stiffness = 0.0_wp       !! [N m/rad]
+      real(wp) :: stop_damping = 0.0_wp         !! [N m s/rad]
+      real(wp) :: latch_angle = none_given      !! [rad]
+      real(wp) :: lock_stiffness = 0.0_wp       !! of a spring in place of the constraint [N m/rad]; 0: a constraint
+      real(wp) :: lock_damping = 0.0_wp         !! beside that spring [N m s/rad]
+      real(wp) :: friction_moment = 0.0_wp      !! [N m]
+      real(wp) :: friction_velocity = 0.0_wp    !! from which all of it acts [rad/s]
+   end type hinge_config
+
    !> &solver
    type :: solver_config
       character(len=name_length) :: method = 'auto' !! 'auto', 'adams', 'bdf', 'erk', 'dop853', 'gauss'
@@ -85,6 +118,7 @@ module rodyn_case_config
       real(wp) :: max_step = 0.0_wp                 !! [s]; 0: no bound
       real(wp) :: fixed_step = 0.0_wp               !! [s], 'erk', 'dop853', 'gauss'; 0: adaptive
       integer :: max_steps = 1000000000             !! steps of the whole run
+      integer :: max_events = 100000                !! events of the whole run
    end type solver_config
 
    !> &output
@@ -104,6 +138,8 @@ module rodyn_case_config
       type(model_config) :: model
       type(initial_config) :: initial
       type(load_config), allocatable :: loads(:)
+      type(kink_config), allocatable :: kink_programs(:)
+      type(hinge_config), allocatable :: hinges(:)
       type(solver_config) :: solver
       type(output_config) :: output
    end type case_config

@@ -1,15 +1,15 @@
 !> All keys of a case, each with its component, in the order of the table.
 module rodyn_case_fields
-   use rodyn_case_config, only: case_config, chain_config, initial_config, load_config, model_config, &
-      output_config, solver_config, spacecraft_config
+   use rodyn_case_config, only: case_config, chain_config, hinge_config, initial_config, kink_config, load_config, &
+      model_config, output_config, solver_config, spacecraft_config
    use rodyn_field_visitor, only: field_visitor
    implicit none (type, external)
    private
-   public :: visit_case, law_takes
+   public :: visit_case, law_takes, kink_law_takes
 
 contains
 
-   !> Visit every key of a case whose `loads` have been allocated.
+   !> Visit every key of a case whose `loads`, `kink_programs` and `hinges` have been allocated.
    subroutine visit_case(visitor, config)
       class(field_visitor), intent(inout) :: visitor
       type(case_config), intent(inout) :: config
@@ -26,6 +26,12 @@ contains
       call visit_initial(visitor, config%initial)
       do i = 1, size(config%loads)
          call visit_load(visitor, i, config%loads(i))
+      end do
+      do i = 1, size(config%kink_programs)
+         call visit_kink_program(visitor, i, config%kink_programs(i))
+      end do
+      do i = 1, size(config%hinges)
+         call visit_hinge(visitor, i, config%hinges(i))
       end do
       call visit_solver(visitor, config%solver)
       call visit_output(visitor, config%output)
@@ -110,6 +116,47 @@ contains
       call visitor%close_group()
    end subroutine visit_load
 
+   !> Only the keys that the law has.
+   subroutine visit_kink_program(visitor, instance, program)
+      class(field_visitor), intent(inout) :: visitor
+      integer, intent(in) :: instance
+      type(kink_config), intent(inout) :: program
+      call visitor%open_group('kink_program', instance)
+      call visitor%field('hinge', program%hinge)
+      call visitor%word_field('law', program%law)
+      if (kink_law_takes(program%law, 't_start')) call visitor%field('t_start', program%t_start)
+      if (kink_law_takes(program%law, 't_end')) call visitor%field('t_end', program%t_end)
+      if (kink_law_takes(program%law, 'value')) call visitor%field('value', program%value)
+      if (kink_law_takes(program%law, 'rate')) call visitor%field('rate', program%rate)
+      if (kink_law_takes(program%law, 'times')) call visitor%field('times', program%times)
+      if (kink_law_takes(program%law, 'values')) call visitor%field('values', program%values)
+      call visitor%close_group()
+   end subroutine visit_kink_program
+
+   subroutine visit_hinge(visitor, instance, hinge)
+      class(field_visitor), intent(inout) :: visitor
+      integer, intent(in) :: instance
+      type(hinge_config), intent(inout) :: hinge
+      call visitor%open_group('hinge', instance)
+      call visitor%field('hinge', hinge%hinge)
+      call visitor%field('held', hinge%held)
+      call visitor%field('release_time', hinge%release_time)
+      call visitor%field('release_after', hinge%release_after)
+      call visitor%field('rest_angle', hinge%rest_angle)
+      call visitor%field('freeplay', hinge%freeplay)
+      call visitor%field('freeplay_stiffness', hinge%freeplay_stiffness)
+      call visitor%field('lower_stop', hinge%lower_stop)
+      call visitor%field('upper_stop', hinge%upper_stop)
+      call visitor%field('stop_stiffness', hinge%stop_stiffness)
+      call visitor%field('stop_damping', hinge%stop_damping)
+      call visitor%field('latch_angle', hinge%latch_angle)
+      call visitor%field('lock_stiffness', hinge%lock_stiffness)
+      call visitor%field('lock_damping', hinge%lock_damping)
+      call visitor%field('friction_moment', hinge%friction_moment)
+      call visitor%field('friction_velocity', hinge%friction_velocity)
+      call visitor%close_group()
+   end subroutine visit_hinge
+
    subroutine visit_solver(visitor, solver)
       class(field_visitor), intent(inout) :: visitor
       type(solver_config), intent(inout) :: solver
@@ -121,6 +168,7 @@ contains
       call visitor%field('max_step', solver%max_step)
       call visitor%field('fixed_step', solver%fixed_step)
       call visitor%field('max_steps', solver%max_steps)
+      call visitor%field('max_events', solver%max_events)
       call visitor%close_group()
    end subroutine visit_solver
 
@@ -150,5 +198,18 @@ contains
          law_takes = .false.
       end select
    end function law_takes
+
+   !> Which of the keys t_start, t_end, value, rate, times and values a kink's law has.
+   pure logical function kink_law_takes(law, key)
+      character(len=*), intent(in) :: law, key
+      select case (key)
+      case ('times', 'values')
+         kink_law_takes = law == 'table'
+      case ('rate')
+         kink_law_takes = law == 'sine'
+      case default
+         kink_law_takes = law /= 'table'
+      end select
+   end function kink_law_takes
 
 end module rodyn_case_fields

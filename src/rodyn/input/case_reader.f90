@@ -75,9 +75,11 @@ contains
       call match_document(document, case_groups, case_rows, checked)
       call check_document(checked, case_extents(rods_of(checked)))
       loader%checked => checked
-      allocate (config%loads(instances(checked, 'load')))
+      allocate (config%loads(instances(checked, 'load')), config%kink_programs(instances(checked, 'kink_program')), &
+                config%hinges(instances(checked, 'hinge')))
       call visit_case(loader, config)
       call complete_loads(checked, config)
+      call complete_kinks(checked, config)
       call check_case(checked, config)
       call checked%faults%to_error(document%name, error)
    end subroutine case_from_document
@@ -111,6 +113,17 @@ contains
          end associate
       end do
    end subroutine complete_loads
+
+   !> The same for kinks that move; a table knows its times.
+   subroutine complete_kinks(checked, config)
+      type(checked_document), intent(in) :: checked
+      type(case_config), intent(inout) :: config
+      integer :: i
+
+      do i = 1, size(config%kink_programs)
+         if (entry_of(checked, 'kink_program', i, 't_end') == 0) config%kink_programs(i)%t_end = config%t_end
+      end do
+   end subroutine complete_kinks
 
    !> A complete commented case that runs as it is.
    function default_case() result(text)

@@ -4,6 +4,7 @@ module rodyn_case_rules
    use rodyn_case_config, only: case_config, load_config
    use rodyn_case_fields, only: law_takes
    use rodyn_checked_document, only: checked_document, blame, entry_of, is_sound
+   use rodyn_hinge_rules, only: check_moving_hinges
    use rodyn_text, only: to_text
    implicit none (type, external)
    private
@@ -30,6 +31,7 @@ contains
          call check_times(checked, i, config%loads(i))
          if (config%loads(i)%law == 'table') call check_table(checked, i, config%loads(i))
       end do
+      call check_moving_hinges(checked, config)
    end subroutine check_case
 
    !> Is the key given, rightly or wrongly?

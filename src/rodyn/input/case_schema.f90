@@ -9,13 +9,17 @@ module rodyn_case_schema
 
    integer, parameter :: rods = 1, nodes = 2, hinges = 3
 
-   type(schema_group), parameter :: case_groups(8) = [ &
+   type(schema_group), parameter :: case_groups(10) = [ &
       schema_group('case', help='what is computed'), &
       schema_group('spacecraft', help='rigid body that carries hinge 0'), &
       schema_group('chain', help='rods and nodes 1..n, hinges 0..n-1; one single value fills a whole array'), &
       schema_group('model', help='which equations, and how they are evaluated'), &
       schema_group('initial', help='state at t = 0'), &
       schema_group('load', repeatable=.true., help='one load; repeat the group for each load, or leave it out'), &
+      schema_group('kink_program', repeatable=.true., &
+         help='a kink that moves; repeat the group for each program, or leave it out'), &
+      schema_group('hinge', repeatable=.true., &
+         help='more of one hinge: angles are joint rotations from its kink; repeat or leave out'), &
       schema_group('solver', help='integration in time'), &
       schema_group('output', help='what is written')]
 
@@ -109,6 +113,54 @@ module rodyn_case_schema
          when="required when law = 'table'", help='increasing times, two at least'), &
       schema_row('load', 'values', type_real, any_list, 'N or N m', 'depends', &
          when="required when law = 'table'", help='value at each of the times, linear in between'), &
+      schema_row('kink_program', 'hinge', type_integer, rule=not_negative, example='0', &
+         help='hinge 0..n-1 whose kink moves'), &
+      schema_row('kink_program', 'law', type_word, default="'smooth_step'", words='ramp|smooth_step|sine|table', &
+         help='how it moves between t_start and t_end; after, it stays; smooth_step: continuous acceleration'), &
+      schema_row('kink_program', 't_start', type_real, unit='s', default='0.0', &
+         help='the motion begins; a table has its own times'), &
+      schema_row('kink_program', 't_end', type_real, unit='s', default='depends', &
+         when='default: t_end of &case', help='the motion ends; a ramp with t_end = t_start is a step'), &
+      schema_row('kink_program', 'value', type_real, unit='rad', default='depends', example='0.1', &
+         when="required unless law = 'table'", help='change of the kink, or amplitude of the sine'), &
+      schema_row('kink_program', 'rate', type_real, unit='rad/s', default='depends', &
+         when="required when law = 'sine'", help='value * sin(rate * (t - t_start))'), &
+      schema_row('kink_program', 'times', type_real, any_list, 's', 'depends', &
+         when="required when law = 'table'", help='increasing times, two at least'), &
+      schema_row('kink_program', 'values', type_real, any_list, 'rad', 'depends', &
+         when="required when law = 'table'", help='value at each time; a cubic spline at rest at its ends'), &
+      schema_row('hinge', 'hinge', type_integer, rule=not_negative, example='0', &
+         help='hinge 0..n-1'), &
+      schema_row('hinge', 'held', type_logical, default='.false.', &
+         help='locked at its initial angle until it is released'), &
+      schema_row('hinge', 'release_time', type_real, unit='s', default='depends', rule=in_range, low=0.0_wp, high=1.0e9_wp, &
+         when='default: never', help='a held hinge is released'), &
+      schema_row('hinge', 'release_after', type_integer, default='depends', rule=not_negative, &
+         when='default: none', help='a held hinge is released when that hinge latches'), &
+      schema_row('hinge', 'rest_angle', type_real, unit='rad', default='0.0', &
+         help='angle at which the spring is slack'), &
+      schema_row('hinge', 'freeplay', type_real, unit='rad', default='0.0', rule=not_negative, &
+         help='the spring acts beyond this rotation from its rest angle, to either side'), &
+      schema_row('hinge', 'freeplay_stiffness', type_real, unit='N m/rad', default='0.0', rule=not_negative, &
+         help='stiffness within the freeplay'), &
+      schema_row('hinge', 'lower_stop', type_real, unit='rad', default='depends', rule=between, low=-1.0e3_wp, high=1.0e3_wp, &
+         when='default: none', help='angle below which a stop acts'), &
+      schema_row('hinge', 'upper_stop', type_real, unit='rad', default='depends', rule=between, low=-1.0e3_wp, high=1.0e3_wp, &
+         when='default: none', help='angle beyond which a stop acts'), &
+      schema_row('hinge', 'stop_stiffness', type_real, unit='N m/rad', default='0.0', rule=not_negative, &
+         help='of both stops'), &
+      schema_row('hinge', 'stop_damping', type_real, unit='N m s/rad', default='0.0', rule=not_negative, &
+         help='of both stops, which push but never pull'), &
+      schema_row('hinge', 'latch_angle', type_real, unit='rad', default='depends', rule=between, low=-1.0e3_wp, high=1.0e3_wp, &
+         when='default: none', help='angle on reaching which the hinge locks for good'), &
+      schema_row('hinge', 'lock_stiffness', type_real, unit='N m/rad', default='0.0', rule=not_negative, &
+         help='of a spring that locks the hinge; 0: a constraint'), &
+      schema_row('hinge', 'lock_damping', type_real, unit='N m s/rad', default='0.0', rule=not_negative, &
+         help='of a damper beside that spring'), &
+      schema_row('hinge', 'friction_moment', type_real, unit='N m', default='0.0', rule=not_negative, &
+         help='moment of dry friction'), &
+      schema_row('hinge', 'friction_velocity', type_real, unit='rad/s', default='depends', rule=positive, &
+         when='required when friction_moment > 0', help='rate up to which friction grows linearly'), &
       schema_row('solver', 'method', type_word, default="'auto'", words='auto|adams|bdf|erk|dop853|gauss', &
          help='auto chooses from the scene; adams, bdf: CVODE; erk: ARKODE; dop853, gauss: our own, orders 8 and 16'), &
       schema_row('solver', 'rtol', type_real, default='1.0e-8', rule=between, low=0.0_wp, high=1.0_wp, &
@@ -123,6 +175,8 @@ module rodyn_case_schema
          help="constant step of erk, dop853 or gauss; 0: adaptive"), &
       schema_row('solver', 'max_steps', type_integer, default='1000000000', rule=at_least, low=1.0_wp, &
          help='most steps of the whole run'), &
+      schema_row('solver', 'max_events', type_integer, default='100000', rule=at_least, low=1.0_wp, &
+         help='most events of hinges in the whole run'), &
       schema_row('output', 'file', type_text, default="''", rule=up_to, high=4096.0_wp, &
          help='path of the result; empty: named after the case file'), &
       schema_row('output', 'ledger', type_logical, default='.true.', &

@@ -2,7 +2,7 @@
 !> system of equations solves itself).
 !>
 !> Steps are taken one at a time towards the stop time; outputs are interpolated by CVODE's own polynomial, so
-!> neither their number nor their times change a step.
+!> neither their number nor their times change a step. Events are found by CVODE's rootfinding on the same polynomial.
 module rodyn_cvode_integrator
    use, intrinsic :: iso_c_binding, only: c_ptr, c_int, c_long, c_double, c_null_ptr, c_associated, c_loc, c_funloc
    use rodyn_kinds, only: wp, i8
@@ -11,14 +11,15 @@ module rodyn_cvode_integrator
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, time_text
    use rodyn_nvector, only: new_nvector, free_nvector, vector_content, content_of
    use rodyn_newton_solver, only: new_newton_matrix, new_newton_solver, linear_system_shim
-   use rodyn_sundials_base, only: callback_data, rhs_shim, weights_shim, quiet_handler, all_finite, raise_return_code
+   use rodyn_sundials_base, only: callback_data, rhs_shim, root_shim, weights_shim, quiet_handler, all_finite, raise_return_code
    use fsundials_context_mod, only: FSUNContext_Create, FSUNContext_Free
    use fsundials_nvector_mod, only: N_Vector
    use fsundials_matrix_mod, only: SUNMatrix, FSUNMatDestroy
    use fsundials_linearsolver_mod, only: SUNLinearSolver, FSUNLinSolFree
    use fsundials_nonlinearsolver_mod, only: SUNNonlinearSolver, FSUNNonlinSolFree
    use fsunnonlinsol_fixedpoint_mod, only: FSUNNonlinSol_FixedPoint
-   use fcvode_mod, only: CV_ADAMS, CV_BDF, CV_SUCCESS, CV_TSTOP_RETURN, CV_ONE_STEP, FCVodeCreate, FCVodeInit, FCVodeReInit, &
+   use fcvode_mod, only: CV_ADAMS, CV_BDF, CV_SUCCESS, CV_TSTOP_RETURN, CV_ROOT_RETURN, CV_ONE_STEP, FCVodeCreate, FCVodeInit, &
+      FCVodeReInit, FCVodeRootInit, FCVodeSetRootDirection, FCVodeSetNoInactiveRootWarn, FCVodeGetRootInfo, &
       FCVodeFree, FCVode, FCVodeGetDky, FCVodeSetUserData, FCVodeWFtolerances, FCVodeSetErrHandlerFn, FCVodeSetMaxOrd, &
       FCVodeSetMaxStep, FCVodeSetStopTime, FCVodeSetStabLimDet, FCVodeSetNonlinearSolver, FCVodeSetLinearSolver, &
       FCVodeSetLinSysFn, FCVodeGetNumErrTestFails, FCVodeGetNumNonlinSolvConvFails, FCVodeGetLastOrder, FCVodeGetLastStep, &
@@ -141,12 +142,28 @@ contains
          call check(error, FCVodeSetMaxStep(self%memory, self%options%max_step), 'CVodeSetMaxStep')
          if (allocated(error)) return
       end if
+      if (self%system%n_events > 0) call watch_events(self, error)
+      if (allocated(error)) return
       if (self%multistep == CV_ADAMS) then
          call attach_fixed_point(self, error)
       else
          call attach_newton(self, error)
       end if
    end subroutine initialize
+
+   !> Let CVODE find where an event function becomes negative.
+   subroutine watch_events(self, error)
+      class(cvode_integrator), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      integer(c_int) :: direction(self%system%n_events)
+
+      direction = -1_c_int
+      call check(error, FCVodeRootInit(self%memory, int(self%system%n_events, c_int), c_funloc(root_shim)), 'CVodeRootInit')
+      if (allocated(error)) return
+      call check(error, FCVodeSetRootDirection(self%memory, direction), 'CVodeSetRootDirection')
+      if (allocated(error)) return
+      call check(error, FCVodeSetNoInactiveRootWarn(self%memory), 'CVodeSetNoInactiveRootWarn')
+   end subroutine watch_events
 
    !> Adams: functional iteration y <- g(y), no acceleration (m = 0): the iteration converges in one or two passes.
    subroutine attach_fixed_point(self, error)
@@ -190,10 +207,11 @@ contains
       type(vector_content), pointer :: content
 
       call self%check_target(t_out, error)
-      do while (.not. allocated(error) .and. self%t_good < t_out)
+      do while (.not. allocated(error) .and. self%t_good < t_out .and. .not. self%pending)
          call self%permit_step(error)
          if (.not. allocated(error)) call one_step(self, error)
       end do
+      self%at_event = self%pending .and. self%t_good <= t_out
       content => content_of(self%state)
       if (.not. allocated(error) .and. t_out < self%t_good) then
          call check(error, FCVodeGetDky(self%memory, t_out, 0_c_int, self%state), 'CVodeGetDky', t_out)
@@ -222,7 +240,7 @@ contains
          self%stop_in_force = self%t_stop
       end if
       flag = FCVode(self%memory, self%t_stop, self%state, t_reached, CV_ONE_STEP)
-      if (flag /= CV_SUCCESS .and. flag /= CV_TSTOP_RETURN) then
+      if (flag /= CV_SUCCESS .and. flag /= CV_TSTOP_RETURN .and. flag /= CV_ROOT_RETURN) then
          self%n_steps = self%n_steps - 1
          call check(error, flag, 'CVode', self%t_good)
          call name_cause(self, error)
@@ -234,7 +252,10 @@ contains
          call raise(error, 'CVode at t = '//time_text(self%t_good)//' s: the state is not finite after the next step')
          return
       end if
-      if (.not. t_reached(1) > self%t_good) then
+      if (flag == CV_ROOT_RETURN) then
+         call take_event(self, error)
+         if (allocated(error)) return
+      else if (.not. t_reached(1) > self%t_good) then
          self%n_steps = self%n_steps - 1
          call raise(error, 'CVode at t = '//time_text(self%t_good)//' s: the step has become too small to advance')
          call name_cause(self, error)
@@ -243,6 +264,18 @@ contains
       self%t_good = t_reached(1)
       self%y_good(:) = content%values
    end subroutine one_step
+
+   !> Which functions made CVODE stop.
+   subroutine take_event(self, error)
+      class(cvode_integrator), intent(inout) :: self
+      type(error_type), allocatable, intent(inout) :: error
+      integer(c_int) :: found(self%system%n_events)
+
+      call check(error, FCVodeGetRootInfo(self%memory, found), 'CVodeGetRootInfo', self%t_good)
+      if (allocated(error)) return
+      self%crossed = found /= 0_c_int
+      self%pending = .true.
+   end subroutine take_event
 
    !> Add what the right-hand side had to say.
    subroutine name_cause(self, error)

@@ -11,6 +11,7 @@ module rodyn_dop853_integrator
    use rodyn_errors, only: error_type, raise
    use rodyn_ode, only: ode_system
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, time_text
+   use rodyn_event_search, only: find_event
    use rodyn_dop853_tableau, only: c2, c3, c4, c5, c6, c7, c8, c9, c10, c11, c12, a2_1, a3_1, a3_2, a4_1, &
       a4_3, a5_1, a5_3, a5_4, a6_1, a6_4, a6_5, a7_1, a7_4, a7_5, a7_6, a8_1, a8_4, a8_5, a8_6, a8_7, a9_1, &
       a9_4, a9_5, a9_6, a9_7, a9_8, a10_1, a10_4, a10_5, a10_6, a10_7, a10_8, a10_9, a11_1, a11_4, a11_5, &
@@ -37,6 +38,7 @@ module rodyn_dop853_integrator
       real(wp), allocatable :: stage(:), increment(:), y_new(:) !! workspace
       real(wp) :: t_first = 0.0_wp       !! start of the interval, where the grid of fixed steps begins [s]
       integer(i8) :: n_grid = 0, i_grid = 0 !! fixed steps of the interval; steps done
+      real(wp), allocatable :: y_event(:) !! workspace, if there are events
       logical :: refused = .false.       !! the last bad try failed because the right-hand side said so
       type(solver_statistics) :: counts
    contains
@@ -44,6 +46,7 @@ module rodyn_dop853_integrator
       procedure :: advance
       procedure :: statistics
       procedure :: finalize
+      procedure :: state_within
    end type dop853_integrator
 
 contains
@@ -110,24 +113,50 @@ contains
       logical :: ok
 
       call self%check_target(t_out, error)
-      do while (.not. allocated(error) .and. self%t < t_out)
+      do while (.not. allocated(error) .and. self%t < t_out .and. .not. self%pending)
          call step(self, error)
       end do
+      self%at_event = self%pending .and. self%t <= t_out
       t = self%t
       y = self%y
       if (allocated(error) .or. t <= t_out) return
-      associate (h => t_out - self%t_before)
-         call stages(self%system, size(y), self%t_before, h, self%y_before, self%f_before, self%k, self%stage, ok)
-         self%counts%n_rhs = self%counts%n_rhs + n_stages - 1
-         call add_increment(size(y), h, self%k, self%increment)
-         y = self%y_before + self%increment
-      end associate
+      call self%state_within(t_out, y, ok)
       if (.not. ok) then
          call raise(error, 'dop853: output at t = '//time_text(t_out)//' s: the right-hand side cannot be evaluated')
          return
       end if
       t = t_out
    end subroutine advance
+
+   !> The state inside the last step, by one shorter step from its start.
+   subroutine state_within(self, t, y, ok)
+      class(dop853_integrator), intent(inout) :: self
+      real(wp), intent(in) :: t !! [s]
+      real(wp), contiguous, intent(out) :: y(:)
+      logical, intent(out) :: ok
+
+      associate (h => t - self%t_before)
+         call stages(self%system, size(y), self%t_before, h, self%y_before, self%f_before, self%k, self%stage, ok)
+         self%counts%n_rhs = self%counts%n_rhs + n_stages - 1
+         call add_increment(size(y), h, self%k, self%increment)
+         y = self%y_before + self%increment
+      end associate
+   end subroutine state_within
+
+   !> Did an event function become negative in the last step? Then the step ends there.
+   subroutine look_for_event(self)
+      class(dop853_integrator), intent(inout) :: self
+      real(wp) :: t
+
+      if (.not. allocated(self%y_event)) allocate (self%y_event(self%system%n_states), source=0.0_wp)
+      call find_event(self, self%t_before, self%y_before, self%f_before, self%t, self%y, self%f, self%pending, t, self%y_event)
+      if (.not. self%pending) return
+      self%t = t
+      self%t_lost = 0.0_wp
+      self%y(:) = self%y_event
+      self%lost = 0.0_wp
+      self%t_good = t
+   end subroutine look_for_event
 
    !> One accepted step: try, and shorten, until the error is below one.
    subroutine step(self, error)
@@ -171,6 +200,7 @@ contains
          self%h = h*max(shrink, safety*norm**(-0.125_wp))
       end do
       call accept(self, h, t_new)
+      if (self%system%n_events > 0) call look_for_event(self)
       if (self%n_grid > 0) return
       factor = grow
       if (norm > 0.0_wp) factor = min(grow, max(shrink, safety*norm**(-0.125_wp)))

@@ -15,6 +15,7 @@ module rodyn_erk_integrator
    use rodyn_ode, only: ode_system
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, time_text
    use rodyn_nvector, only: new_nvector, free_nvector, vector_content, content_of
+   use rodyn_event_search, only: find_event
    use rodyn_sundials_base, only: callback_data, rhs_shim, weights_shim, quiet_handler, all_finite, raise_return_code
    use fsundials_context_mod, only: FSUNContext_Create, FSUNContext_Free
    use fsundials_nvector_mod, only: N_Vector
@@ -47,6 +48,7 @@ module rodyn_erk_integrator
       real(wp), allocatable :: rates(:, :)    !! of the stages of an output step (n_states, stages)
       real(wp) :: t_before = 0.0_wp           !! start of the last internal step [s]
       real(wp), allocatable :: y_before(:)    !! state there (n_states)
+      real(wp), allocatable, dimension(:) :: f_before, f_now, y_event !! for events: rates at both ends of the step; workspace
       real(wp) :: t_first = 0.0_wp            !! start of the interval, where the grid of fixed steps begins [s]
       integer(i8) :: n_grid = 0, i_grid = 0   !! fixed steps of the interval; steps done
       real(wp) :: stop_in_force = -huge(1.0_wp) !! the stop time ARKODE knows [s]
@@ -60,6 +62,7 @@ module rodyn_erk_integrator
       procedure :: advance
       procedure :: statistics
       procedure :: finalize
+      procedure :: state_within
       final :: finalize_handles
    end type erk_integrator
 
@@ -118,6 +121,8 @@ contains
       self%t_before = t
       self%y_before = y
       self%stop_in_force = -huge(1.0_wp)
+      if (self%system%n_events > 0) call begin_events(self, error)
+      if (allocated(error)) return
       if (c_associated(self%memory)) then
          self%before_restart = self%statistics()
          call check(error, FERKStepReInit(self%memory, c_funloc(rhs_shim), t, self%state), 'ERKStepReInit', t)
@@ -244,10 +249,11 @@ contains
 
       call self%check_target(t_out, error)
       if (.not. allocated(error)) call heed_stop(self, error)
-      do while (.not. allocated(error) .and. self%t_good < t_out)
+      do while (.not. allocated(error) .and. self%t_good < t_out .and. .not. self%pending)
          call self%permit_step(error)
          if (.not. allocated(error)) call one_step(self, error)
       end do
+      self%at_event = self%pending .and. self%t_good <= t_out
       if (.not. allocated(error) .and. t_out < self%t_good) then
          call output_step(self, t_out, y, error)
          t = t_out
@@ -316,7 +322,55 @@ contains
       self%y_before(:) = self%y_good
       self%t_good = t_reached(1)
       self%y_good(:) = content%values
+      if (self%system%n_events > 0) call look_for_event(self, error)
    end subroutine one_step
+
+   !> Rates at the start, for the first look into a step.
+   subroutine begin_events(self, error)
+      class(erk_integrator), intent(inout) :: self
+      type(error_type), allocatable, intent(inout) :: error
+
+      if (.not. allocated(self%f_now)) allocate (self%f_before(self%system%n_states), self%f_now(self%system%n_states), &
+                                                 self%y_event(self%system%n_states), source=0.0_wp)
+      call rates_now(self, error)
+   end subroutine begin_events
+
+   subroutine rates_now(self, error)
+      class(erk_integrator), intent(inout) :: self
+      type(error_type), allocatable, intent(inout) :: error
+      logical :: ok
+      call self%system%rhs(self%t_good, self%y_good, self%f_now, ok)
+      self%data%n_rhs = self%data%n_rhs + 1
+      if (.not. ok) call raise(error, 'erk at t = '//time_text(self%t_good)//' s: the right-hand side cannot be evaluated')
+   end subroutine rates_now
+
+   !> Did an event function become negative in the last step? Then the step ends there. ARKODE's own rootfinding works on
+   !> its cubic interpolant, which is too coarse.
+   subroutine look_for_event(self, error)
+      class(erk_integrator), intent(inout) :: self
+      type(error_type), allocatable, intent(inout) :: error
+      real(wp) :: t
+
+      self%f_before(:) = self%f_now
+      call rates_now(self, error)
+      if (allocated(error)) return
+      call find_event(self, self%t_before, self%y_before, self%f_before, self%t_good, self%y_good, self%f_now, &
+                      self%pending, t, self%y_event)
+      if (.not. self%pending) return
+      self%t_good = t
+      self%y_good(:) = self%y_event
+   end subroutine look_for_event
+
+   !> For `rodyn_event_search`.
+   subroutine state_within(self, t, y, ok)
+      class(erk_integrator), intent(inout) :: self
+      real(wp), intent(in) :: t
+      real(wp), contiguous, intent(out) :: y(:)
+      logical, intent(out) :: ok
+      type(error_type), allocatable :: error
+      call output_step(self, t, y, error)
+      ok = .not. allocated(error)
+   end subroutine state_within
 
    !> The next step ends on the next point of the grid, so that times are never summed up.
    subroutine set_fixed_step(self, error)

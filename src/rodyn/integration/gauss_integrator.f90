@@ -112,7 +112,8 @@ contains
          if (.not. self%mechanics%has_lanes()) nullify (self%mechanics)
       end if
       if (.not. associated(self%mechanics)) then
-         call raise(error, "'gauss' cannot integrate this system (joint rotations that are states of their own: dampers = 'exact')")
+         call raise(error, "'gauss' cannot integrate this system (joint rotations that are states of their own: "// &
+                    "dampers = 'exact'; hinges that change their laws, which its long steps would not see)")
          return
       end if
       self%system => system

@@ -60,6 +60,10 @@ module rodyn_integrator
       real(wp), allocatable :: y_good(:)  !! state there (n_states)
       integer(i8) :: n_steps = 0          !! internal steps of the whole run
       integer(i8) :: n_starts = 0
+      logical :: at_event = .false.       !! the last `advance` ended at an event, the system must respond, and `start` follow
+      logical :: pending = .false.        !! the steps have met an event, at t_good
+      logical, allocatable :: crossed(:)  !! the event functions that became negative there (n_events)
+      real(wp), allocatable :: margin(:)  !! event functions at the end of the last step (n_events)
       integer(i8), private :: clock_report = 0, clock_look = 0 !! wall clock at the last report, the last look [counts]
       integer, private :: steps_to_look = 1, stride = 1        !! the clock is read every `stride` steps
    contains
@@ -72,6 +76,7 @@ module rodyn_integrator
       procedure :: begin_interval
       procedure :: check_target
       procedure :: permit_step
+      procedure :: state_within
    end type integrator_type
 
    abstract interface
@@ -94,14 +99,15 @@ module rodyn_integrator
          type(error_type), allocatable, intent(out) :: error
       end subroutine start_interface
 
-      !> Integrate to exactly t_out. On failure `error` is allocated and t, y are the last good internal time and state.
+      !> Integrate to exactly t_out, or to an event before or at it (`at_event`).
+      !> On failure `error` is allocated and t, y are the last good internal time and state.
       subroutine advance_interface(self, t_out, y, t, error)
          import :: integrator_type, error_type, wp
          implicit none (type, external)
          class(integrator_type), intent(inout) :: self
          real(wp), intent(in) :: t_out !! not before the previous one, not after the stop time [s]
          real(wp), contiguous, intent(out) :: y(:) !! (n_states)
-         real(wp), intent(out) :: t    !! t_out, or the last good time [s]
+         real(wp), intent(out) :: t    !! t_out, that of the event, or the last good time [s]
          type(error_type), allocatable, intent(out) :: error
       end subroutine advance_interface
 
@@ -165,6 +171,13 @@ contains
       self%t_good = t
       self%y_good = y
       self%n_starts = self%n_starts + 1
+      self%at_event = .false.
+      self%pending = .false.
+      associate (n => self%system%n_events)
+         if (n == 0) return
+         if (.not. allocated(self%margin)) allocate (self%margin(n), self%crossed(n))
+         call self%system%event_functions(t, self%y_good, self%margin)
+      end associate
    end subroutine begin_interval
 
    !> Refuse an output time beyond the stop time, or an integrator that was never started.
@@ -178,6 +191,17 @@ contains
          call raise(error, 'advance to t = '//time_text(t_out)//' s: beyond the stop time '//time_text(self%t_stop)//' s')
       end if
    end subroutine check_target
+
+   !> The state at a time within the last internal step, as accurate as the steps. For `rodyn_event_search`.
+   subroutine state_within(self, t, y, ok)
+      class(integrator_type), intent(inout) :: self
+      real(wp), intent(in) :: t                 !! [s]
+      real(wp), contiguous, intent(out) :: y(:) !! (n_states)
+      logical, intent(out) :: ok
+      associate (unused_t => t); end associate
+      y = self%y_good
+      ok = .false.
+   end subroutine state_within
 
    !> Called before each internal step: counts it, refuses one too many, lets the monitor speak and stop the run.
    subroutine permit_step(self, error)

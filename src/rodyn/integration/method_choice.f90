@@ -71,7 +71,7 @@ contains
          choice%steps = t_end*choice%frequency/collocation_phase(options%rtol)
          return
       end if
-      call try_methods(scene, y, options, minval([t_end, pack(scene%loads%switches, scene%loads%switches > 0.0_wp)]), t_end, &
+      call try_methods(scene, y, options, minval([t_end, scene%switches]), t_end, &
                        trial_share, forecast, choice%effort)
       forecast(:2) = forecast(:2)/lead ! dop853, gauss
       best = minloc(forecast, dim=1)
@@ -113,7 +113,7 @@ contains
       real(wp) :: explicit_phase, radians
 
       collocation_is_cheaper = .false.
-      if (scene%assembled .or. scene%n_q > scene%n_dof .or. decay > frequency) return
+      if (scene%assembled .or. scene%n_q > scene%n_dof .or. decay > frequency .or. size(scene%hinges%mechanisms) > 0) return
       radians = frequency*t_end
       explicit_phase = vibration_limit*min(1.0_wp, (1.0e4_wp*options%rtol)**0.125_wp)
       collocation_is_cheaper = first_search*scene%n_dof + iterations*effort_of_nodes(scene)*radians/ &

@@ -149,6 +149,7 @@ contains
       real(wp), intent(in) :: t_end
       type(solver_options) :: own
       type(error_type), allocatable :: error
+      real(wp) :: begin(size(y))
 
       own = options
       own%order = candidate%order
@@ -156,7 +157,10 @@ contains
       allocate (self%motion)
       call new_motion(self%motion, scene, .false., error)
       if (.not. allocated(error)) then
-         call self%motion%dynamics%set_regime(0.0_wp, t_end)
+         begin = y
+         call self%motion%begin_regime(0.0_wp, t_end, t_end, begin, error)
+      end if
+      if (.not. allocated(error)) then
          call new_integrator(self%integrator, self%motion, trim(candidate%method), own, error)
       end if
       if (.not. allocated(error)) then
@@ -190,11 +194,21 @@ contains
          call self%integrator%advance(t_end, state, self%reached, error)
          stats = self%integrator%statistics()
          self%effort = effort_of(candidate%method, scene, stats)
+         if (.not. allocated(error) .and. self%integrator%at_event) call pass_event(self, state, error)
          self%failed = allocated(error) .and. self%reached < t_end .and. stats%n_steps < self%integrator%options%max_steps
       end do
       if (.not. self%effort > effort_before) return
       self%pace = (self%reached - reached_before)/(self%effort - effort_before)
       if (pace_before > 0.0_wp) self%growth = [self%pace/pace_before, self%growth(1)]
    end subroutine continue_runner
+
+   !> Go on behind an event.
+   subroutine pass_event(self, y, error)
+      type(runner), intent(inout) :: self
+      real(wp), contiguous, intent(inout) :: y(:)
+      type(error_type), allocatable, intent(out) :: error
+      call self%motion%respond(self%reached, self%integrator%crossed, y, error)
+      if (.not. allocated(error)) call self%integrator%start(self%reached, y, error)
+   end subroutine pass_event
 
 end module rodyn_method_trial

@@ -17,8 +17,10 @@ module rodyn_ode
    type, abstract :: ode_system
       integer :: n_states = 0     !! length of y
       integer :: n_controlled = 0 !! leading states in the error norm
+      integer :: n_events = 0     !! functions whose sign changes end the smooth part of the run
       type(dense_newton), private :: dense
    contains
+      procedure :: event_functions
       procedure(rhs_interface), deferred :: rhs
       procedure(jacobian_interface), deferred :: jacobian
       procedure :: factorise_newton => factorise_dense
@@ -83,7 +85,7 @@ module rodyn_ode
          implicit none (type, external)
          class(mechanical_system), intent(inout) :: self
          real(wp), intent(in) :: t
-         real(wp), intent(in) :: q(:), p(:) !! (n_dof)
+         real(wp), contiguous, intent(in) :: q(:), p(:) !! (n_dof)
          real(wp), intent(out) :: rate(:)   !! (n_states - 2 n_dof)
       end subroutine quadratures_interface
    end interface
@@ -113,6 +115,17 @@ module rodyn_ode
    end interface
 
 contains
+
+   !> Values that are positive while the present right-hand side holds; where one becomes negative, integration stops for the
+   !> system to change. A system with `n_events` > 0 overrides this.
+   subroutine event_functions(self, t, y, values)
+      class(ode_system), intent(inout) :: self
+      real(wp), intent(in) :: t                  !! [s]
+      real(wp), contiguous, intent(in) :: y(:)   !! (n_states)
+      real(wp), contiguous, intent(out) :: values(:) !! (n_events)
+      associate (unused => self, unused_t => t, unused_y => y); end associate
+      values = 1.0_wp
+   end subroutine event_functions
 
    !> Factor 1 - gamma df/dy. Nothing depends on the quadratures; their rows are left out, so that a system with them is
    !> solved to the last bit as one without. Their own correction is within the tolerance of the iteration.

@@ -1,4 +1,4 @@
-!> One scene from its initial state to the end: regime after regime of loads, output after output.
+!> One scene from its initial state to the end: regime after regime of loads, event after event, output after output.
 module rodyn_simulation
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
@@ -28,8 +28,9 @@ module rodyn_simulation
 
 contains
 
-   !> Integrate from t = 0 to t_end and show the observer the states at `times`. At each switch of a load the
-   !> integration stops exactly and starts anew. On failure t and y are the last good ones.
+   !> Integrate from t = 0 to t_end and show the observer the states at `times`. At each switch of a load or a kink, at
+   !> each release and each event of a hinge the integration stops exactly and starts anew. On failure t and y are the last
+   !> good ones.
    subroutine simulate(motion, integrator, times, t_end, observer, y, t, error)
       type(motion_type), intent(inout), target :: motion
       class(integrator_type), intent(inout) :: integrator !! made for this motion
@@ -42,35 +43,47 @@ contains
       real(wp), allocatable :: ends(:)
       integer :: segment, next
 
-      associate (switches => motion%dynamics%scene%loads%switches)
+      associate (switches => motion%dynamics%scene%switches)
          ends = [pack(switches, switches < t_end), t_end]
       end associate
       t = 0.0_wp
       next = 1
       do segment = 1, size(ends)
-         call motion%dynamics%set_regime(t, ends(segment))
+         call motion%begin_regime(t, ends(segment), t_end, y, error)
+         if (allocated(error)) return
          if (segment == 1) call observe_now()
          if (allocated(error)) return
          call integrator%set_stop(ends(segment))
          call integrator%start(t, y, error)
-         if (allocated(error)) return
-         do while (next <= size(times))
-            if (times(next) > ends(segment)) exit
-            call integrator%advance(times(next), y, t, error)
-            if (allocated(error)) return
-            call observe_now()
-            if (allocated(error)) return
+         do while (t < ends(segment) .and. .not. allocated(error))
+            call go_on(ends(segment))
          end do
-         if (t < ends(segment)) call integrator%advance(ends(segment), y, t, error)
          if (allocated(error)) return
       end do
 
    contains
 
+      !> To the next output time, event, or the end of the regime.
+      subroutine go_on(t_stop)
+         real(wp), intent(in) :: t_stop
+         real(wp) :: target_time
+
+         target_time = t_stop
+         if (next <= size(times)) target_time = min(times(next), t_stop)
+         call integrator%advance(target_time, y, t, error)
+         if (allocated(error)) return
+         call observe_now()
+         if (allocated(error) .or. .not. integrator%at_event) return
+         call motion%respond(t, integrator%crossed, y, error)
+         if (allocated(error) .or. t >= t_stop) return
+         call integrator%start(t, y, error)
+      end subroutine go_on
+
       !> Show the state if the next output time has come.
       subroutine observe_now()
          if (next > size(times)) return
          if (times(next) > t) return
+         call motion%dynamics%move_kinks(t)
          call observer%observe(motion, t, y, error)
          next = next + 1
       end subroutine observe_now

@@ -449,7 +449,7 @@ contains
 
       call h5dopen_f(self%id, name, set, status)
       if (self%failed(status, 'h5dopen_f', name, error)) return
-      call h5dsset_scale_f(set, status, name)
+      call h5dsset_scale_f(set, status, name(index(name, '/', back=.true.) + 1:))
       if (self%failed(status, 'h5dsset_scale_f', name, error)) continue
       call h5dclose_f(set, status)
    end subroutine make_scale

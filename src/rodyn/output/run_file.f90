@@ -17,7 +17,7 @@ module rodyn_run_file
    use rodyn_run_layout, only: i_alpha, i_alpha_rate, i_angular_momentum, i_beta, i_beta_rate, i_displacement_x, &
       i_displacement_y, i_energy_dissipated, i_energy_elastic, i_energy_kinetic, i_energy_residual, i_momentum_x, &
       i_momentum_y, i_omega, i_phi, i_phi_rate, i_rotation, i_time, i_velocity_x, i_velocity_y, i_work_external, &
-      n_run_variables, run_coordinates, run_variables, solver_group
+      n_run_variables, run_coordinates, run_variables, solver_group, events_group
    implicit none (type, external)
    private
    public :: run_file, run_header, run_row, solver_report, new_run_row, check_output_path
@@ -106,6 +106,7 @@ module rodyn_run_file
    contains
       procedure :: create
       procedure :: append
+      procedure :: write_events
       procedure :: finish
       procedure :: discard
       procedure :: redirect
@@ -236,6 +237,35 @@ contains
       if (.not. allocated(error)) call self%file%flush(error)
       if (allocated(error)) call self%discard()
    end subroutine append
+
+   !> The group `events` of a run that may have some, before `finish`. Without events its data sets are empty.
+   subroutine write_events(self, time, hinge, kind, energy_lost, error)
+      class(run_file), intent(inout) :: self
+      real(wp), intent(in) :: time(:)          !! [s]
+      integer, intent(in) :: hinge(:)          !! 0..n-1
+      character(len=*), intent(in) :: kind(:)
+      real(wp), intent(in) :: energy_lost(:)   !! [J]
+      type(error_type), allocatable, intent(out) :: error
+      character(len=*), parameter :: names(4) = [character(len=18) :: 'events/time', 'events/hinge', 'events/kind', &
+         'events/energy_lost']
+      character(len=*), parameter :: units(4) = [character(len=2) :: 's', '1', '1', 'J']
+      character(len=*), parameter :: meanings(4) = [character(len=48) :: 'time of the event', &
+         'hinge, counted from the spacecraft', 'what happened', 'mechanical energy lost in it']
+      integer :: i
+
+      call self%file%create_group(events_group, error)
+      if (.not. allocated(error)) call self%file%write('events/time', time, 0, error)
+      if (.not. allocated(error)) call self%file%make_scale('events/time', error)
+      if (.not. allocated(error)) call self%file%write('events/hinge', hinge, 0, error)
+      if (.not. allocated(error)) call self%file%create_series('events/kind', [integer ::], max(1, size(kind)), 0, error, 'text')
+      if (.not. allocated(error)) call self%file%append('events/kind', kind, error)
+      if (.not. allocated(error)) call self%file%write('events/energy_lost', energy_lost, 0, error)
+      do i = 1, size(names)
+         if (.not. allocated(error)) call describe(self%file, trim(names(i)), trim(units(i)), trim(meanings(i)), error)
+         if (i > 1 .and. .not. allocated(error)) call self%file%attach_scale(trim(names(i)), 1, 'events/time', error)
+      end do
+      if (allocated(error)) call self%discard()
+   end subroutine write_events
 
    !> Write what waits, the final attributes, and give the file its final name.
    subroutine finish(self, status, report, error, message)

@@ -2,7 +2,7 @@
 module rodyn_run_layout
    implicit none (type, external)
    private
-   public :: run_variable, run_coordinate, run_variables, run_coordinates, n_run_variables, solver_group
+   public :: run_variable, run_coordinate, run_variables, run_coordinates, n_run_variables, solver_group, events_group
    public :: i_time, i_phi, i_alpha, i_beta, i_phi_rate, i_alpha_rate, i_beta_rate, i_velocity_x, i_velocity_y, i_omega, &
       i_displacement_x, i_displacement_y, i_rotation, i_energy_kinetic, i_energy_elastic, i_energy_dissipated, &
       i_work_external, i_energy_residual, i_momentum_x, i_momentum_y, i_angular_momentum
@@ -25,6 +25,7 @@ module rodyn_run_layout
    end type run_coordinate
 
    character(len=*), parameter :: solver_group = 'solver'
+   character(len=*), parameter :: events_group = 'events'
 
    !> Places in `run_variables`.
    enum, bind(c)

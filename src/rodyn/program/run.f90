@@ -17,6 +17,8 @@ module rodyn_run
    use rodyn_progress, only: progress_monitor, new_progress
    use rodyn_description, only: describe_scene
    use rodyn_notes, only: notes_on
+   use rodyn_hinge_mechanism, only: kind_names
+   use rodyn_user_load, only: user_load
    implicit none (type, external)
    private
    public :: run_case, options_of
@@ -38,13 +40,14 @@ contains
    !> Run a case and write its file. On failure of the integration the file holds all rows until then, with
    !> status 'failed'; on refused input nothing is written. A run that is asked to stop (see `watch_signals`) leaves
    !> its rows in `path`.stopped, so that the same call can be made again.
-   subroutine run_case(config, path, error, input_text, force, quiet)
+   subroutine run_case(config, path, error, input_text, force, quiet, load)
       type(case_config), intent(in) :: config
       character(len=*), intent(in) :: path                 !! of the HDF5 file
       type(error_type), allocatable, intent(out) :: error
       character(len=*), intent(in), optional :: input_text !! namelist as read, kept in the file
       logical, intent(in), optional :: force               !! replace an existing file
       logical, intent(in), optional :: quiet               !! print nothing
+      class(user_load), target, intent(inout), optional :: load !! forces of the caller's, beside those of the case
       type(scene_type) :: scene
       type(motion_type), target :: motion
       type(recorder_type) :: recorder
@@ -70,6 +73,8 @@ contains
       if (.not. allocated(error)) call new_scene(scene, config, error)
       if (.not. allocated(error)) call new_motion(motion, scene, config%output%ledger, error)
       if (allocated(error)) return
+      if (present(load)) call motion%set_user_load(load)
+      motion%events%most = config%solver%max_events
       call initial_state(motion, config%initial, y)
       call choose_method(choice, config%solver, options_of(config), scene, y(:motion%n_controlled), config%t_end)
       header%notes = notes_on(scene, y(:scene%n_dof), config%output%ledger)
@@ -104,8 +109,10 @@ contains
          if (failure%exit_code == exit_stopped) written = path//'.stopped'
       end if
       if (written /= path) call recorder%file%redirect(written)
-      call close_file(recorder%file, integrator, choice, config, scene, failure, &
+      if (motion%events%watches) call write_events(recorder%file, motion, error)
+      if (.not. allocated(error)) call close_file(recorder%file, integrator, choice, config, scene, failure, &
                       real(clock_end - clock_start, wp)/real(clock_rate, wp), error)
+      if (.not. silent .and. .not. allocated(error)) call print_events(motion)
       if (.not. silent .and. .not. allocated(error)) &
          call print_result(integrator, recorder, written, config, t, &
                            real(clock_end - clock_start, wp)/real(clock_rate, wp), failure)
@@ -185,6 +192,34 @@ contains
          call file%finish('failed', report, error, failure%message)
       end if
    end subroutine close_file
+
+   !> What hinges did, into the file.
+   subroutine write_events(file, motion, error)
+      type(run_file), intent(inout) :: file
+      type(motion_type), intent(in) :: motion
+      type(error_type), allocatable, intent(out) :: error
+      associate (events => motion%events%log(:motion%events%n_logged))
+         call file%write_events(events%time, events%hinge, kind_names(events%kind), events%energy_lost, error)
+      end associate
+   end subroutine write_events
+
+   !> Each event on a line of its own, as long as they are few.
+   subroutine print_events(motion)
+      type(motion_type), intent(in) :: motion
+      integer, parameter :: most_lines = 20
+      character(len=16) :: lost
+      integer :: i
+
+      do i = 1, min(most_lines, motion%events%n_logged)
+         associate (event => motion%events%log(i))
+            write (lost, '(es10.3)') event%energy_lost
+            write (output_unit, '(a, i0, a)') 'event   t = '//time_text(event%time)//' s: hinge ', event%hinge, ' '// &
+               trim(kind_names(event%kind))//', '//trim(adjustl(lost))//' J lost'
+         end associate
+      end do
+      if (motion%events%n_logged > most_lines) write (output_unit, '(a, i0, a)') 'event   and ', &
+         motion%events%n_logged - most_lines, ' more, all in the file'
+   end subroutine print_events
 
    !> Each note on a line of its own.
    subroutine print_notes(notes)

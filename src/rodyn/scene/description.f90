@@ -1,5 +1,6 @@
 !> A few lines on what a scene uses and what it skips, for the terminal.
 module rodyn_description
+   use rodyn_kinds, only: wp
    use rodyn_scene, only: scene_type
    use rodyn_integrator, only: time_text
    implicit none (type, external)
@@ -23,7 +24,9 @@ contains
       call note(.not. scene%lumped, 'rod inertia')
       call note(scene%dynamic_bending .and. scene%consistent, 'second-order inertia')
       call note(scene%hinges%has_damping, 'dampers')
-      call note(scene%hinges%has_kinks, 'kinks')
+      call note(any(abs(scene%kinks%constant) > 0.0_wp) .or. scene%hinges%driven, 'kinks')
+      if (scene%hinges%driven) call note(.true., 'driven kinks')
+      if (size(scene%hinges%mechanisms) > 0) call note(.true., 'laws of hinges')
       call note_loads()
       call note(ledger, 'ledger')
       text = 'scene   '//count_text(scene%n, 'rod')//' ('//count_text(size(scene%rods), 'distinct kind')//'), '// &

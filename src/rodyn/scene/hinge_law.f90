@@ -1,6 +1,10 @@
 !> Moments of the visco-elastic hinges, MODEL sec. 1, 2 and 5.
 !>
-!> With joint rotation th and its rate, T = C th + D th'. When bending is quasistatic the rods are springs in
+!> With joint rotation th and its rate, T = C th + D th' + t0 + f. Kinks may move (`rodyn_kink_program`); t0 and f, the moment
+!> of sliding friction, are zero but for mechanisms (`rodyn_hinge_mechanism`), whose C, D, t0 and f change at events. What
+!> does not depend on angles and rates is one number a hinge, T = C opening + D opening' - offset,
+!>     offset = C gamma + D gamma' - t0 - f.
+!> When bending is quasistatic the rods are springs in
 !> series with the hinges, and the joint rotations follow from one constant tridiagonal system (see
 !> `rodyn_three_moments`). Dampers in such a series are treated in one of two ways:
 !> - `reduced`: rates follow from the same system as rotations, accurate to (D w/C)^2;
@@ -11,12 +15,13 @@
 !> th is given; see docs/locks.md.
 module rodyn_hinge_law
    use rodyn_kinds, only: wp
-   use rodyn_case_config, only: chain_config
+   use rodyn_case_config, only: chain_config, hinge_config
+   use rodyn_hinge_mechanism, only: hinge_mechanism, new_mechanism
    use rodyn_three_moments, only: three_moments, new_three_moments
    implicit none (type, external)
    private
    public :: hinge_law, new_hinge_law, hinge_moments, hinge_state, hinge_rates, hinge_tangent, openings, relaxation_rates, &
-      initial_joints
+      relaxation_tangent, initial_joints, spring_energy
 
    !> Springs, dampers and kinks of hinges 0..n-1.
    type :: hinge_law
@@ -24,8 +29,17 @@ module rodyn_hinge_law
       real(wp), allocatable :: stiffness(:) !! C (0:n-1) [N m/rad]
       real(wp), allocatable :: damping(:)   !! D (0:n-1) [N m s/rad]
       real(wp), allocatable :: kink(:)      !! gamma (0:n-1) [rad]
+      real(wp), allocatable :: kink_rate(:) !! gamma' (0:n-1) [rad/s]
+      real(wp), allocatable :: constant(:)  !! t0 (0:n-1) [N m]
+      real(wp), allocatable :: friction(:)  !! f (0:n-1) [N m]
+      real(wp), allocatable :: offset(:)    !! C gamma + D gamma' - t0 - f (0:n-1) [N m]
+      real(wp), allocatable :: steady(:)    !! t0 of hinges that are neither relaxing nor locked (0:n-1) [N m]
+      real(wp), allocatable :: bent(:)      !! quasistatic: opening that it makes in the rods (0:n-1) [rad]
+      type(hinge_mechanism), allocatable :: mechanisms(:) !! hinges that are more than this, in any order
       logical :: has_damping = .false.      !! some D > 0
-      logical :: has_kinks = .false.        !! some gamma /= 0
+      logical :: driven = .false.           !! some kink moves
+      logical :: has_offsets = .false.      !! some offset may not be zero
+      logical :: has_friction = .false.     !! some f /= 0
       logical :: quasistatic = .false.      !! rods bend without inertia
       type(three_moments) :: series         !! hinges and rods in series, when quasistatic
       integer, allocatable :: relaxing(:)   !! hinges whose rotation is a state (only quasistatic, exact dampers)
@@ -36,34 +50,116 @@ module rodyn_hinge_law
    contains
       procedure :: lock
       procedure :: fastest_relaxation
+      procedure :: set_kinks
+      procedure :: set_mechanisms
    end type hinge_law
 
 contains
 
    !> Take over the hinges of a chain; factor the three-moment equation if bending is quasistatic.
-   subroutine new_hinge_law(law, chain, quasistatic, exact_dampers)
+   subroutine new_hinge_law(law, chain, quasistatic, exact_dampers, driven, hinges)
       type(hinge_law), intent(out) :: law
       type(chain_config), intent(in) :: chain
       logical, intent(in) :: quasistatic
       logical, intent(in) :: exact_dampers !! matters only when quasistatic
+      logical, intent(in) :: driven !! some kink will move
+      type(hinge_config), intent(in), optional :: hinges(:) !! more of some hinges; absent (not allocated): of none
       logical :: given(0:chain%n_rods - 1)
       integer :: k
 
       law%n = chain%n_rods
-      allocate (law%stiffness(0:law%n - 1), law%damping(0:law%n - 1), law%kink(0:law%n - 1))
+      allocate (law%stiffness(0:law%n - 1), law%damping(0:law%n - 1), law%kink(0:law%n - 1), law%kink_rate(0:law%n - 1), &
+                law%constant(0:law%n - 1), law%friction(0:law%n - 1), law%offset(0:law%n - 1), &
+                law%steady(0:law%n - 1), law%bent(0:law%n - 1), &
+                source=0.0_wp)
       allocate (law%locked(0:law%n - 1), source=.false.)
       allocate (law%held(0), law%held_at(0))
       law%stiffness(:) = chain%hinge_stiffness
       law%damping(:) = chain%hinge_damping
       law%kink(:) = chain%kink
-      law%has_damping = any(law%damping > 0.0_wp)
-      law%has_kinks = any(law%kink /= 0.0_wp)
       law%quasistatic = quasistatic
+      law%driven = driven
       given = quasistatic .and. exact_dampers .and. law%damping > 0.0_wp
       law%relaxing = pack([(k, k=0, law%n - 1)], given)
-      if (quasistatic) call new_three_moments(law%series, law%stiffness, &
-                                              chain%length/(6.0_wp*chain%bending_stiffness), given)
+      if (quasistatic) law%series%slope = chain%length/(6.0_wp*chain%bending_stiffness)
+      allocate (law%mechanisms(0))
+      if (present(hinges)) then
+         deallocate (law%mechanisms)
+         allocate (law%mechanisms(size(hinges)))
+         do k = 1, size(hinges)
+            call new_mechanism(law%mechanisms(k), hinges(k), chain, quasistatic .and. .not. exact_dampers)
+         end do
+      end if
+      call law%set_mechanisms()
    end subroutine new_hinge_law
+
+   !> Compile the laws that the mechanisms have now.
+   subroutine set_mechanisms(self)
+      class(hinge_law), intent(inout) :: self
+      type(three_moments) :: series
+      logical :: given(0:self%n - 1)
+      integer :: i
+
+      do i = 1, size(self%mechanisms)
+         associate (k => self%mechanisms(i)%hinge)
+            call self%mechanisms(i)%linear_law(self%stiffness(k), self%damping(k), self%constant(k), self%friction(k))
+         end associate
+      end do
+      self%has_damping = any(self%damping > 0.0_wp)
+      self%has_friction = any(abs(self%friction) > 0.0_wp)
+      if (self%quasistatic) then
+         given = self%locked
+         given(self%relaxing) = .true.
+         call new_three_moments(series, self%stiffness, self%series%slope, given)
+         self%series = series
+         call bend_rods(self)
+      end if
+      call self%set_kinks(self%kink, self%kink_rate)
+      self%has_offsets = self%driven .or. any(abs(self%offset) > 0.0_wp) .or. any(abs(self%kink) > 0.0_wp)
+   end subroutine set_mechanisms
+
+   !> Opening F t0 that the constant moments make in the rods (`rodyn_three_moments`); relaxing and locked
+   !> hinges have T as an unknown.
+   pure subroutine bend_rods(self)
+      type(hinge_law), intent(inout) :: self
+
+      self%steady = self%constant
+      self%steady(self%relaxing) = 0.0_wp
+      self%steady(self%held) = 0.0_wp
+      call bend_by(self, self%steady, self%bent)
+   end subroutine bend_rods
+
+   !> Opening F T that moments make in the rods.
+   pure subroutine bend_by(self, moment, opening)
+      type(hinge_law), intent(in) :: self
+      real(wp), intent(in) :: moment(0:)   !! (0:n-1) [N m]
+      real(wp), intent(out) :: opening(0:) !! (0:n-1) [rad]
+      integer :: k
+
+      opening = 0.0_wp
+      do k = 1, self%n
+         associate (slope => self%series%slope(k))
+            opening(k - 1) = opening(k - 1) + 2.0_wp*slope*moment(k - 1)
+            if (k == self%n) cycle
+            opening(k - 1) = opening(k - 1) + slope*moment(k)
+            opening(k) = opening(k) + slope*(moment(k - 1) + 2.0_wp*moment(k))
+         end associate
+      end do
+   end subroutine bend_by
+
+   !> Move the kinks. Scenes whose kinks move have `has_offsets` set for good.
+   pure subroutine set_kinks(self, kink, kink_rate)
+      class(hinge_law), intent(inout) :: self
+      real(wp), intent(in) :: kink(0:)      !! gamma (0:n-1) [rad]
+      real(wp), intent(in) :: kink_rate(0:) !! gamma' (0:n-1) [rad/s]
+      integer :: k
+
+      do k = 0, self%n - 1
+         self%kink(k) = kink(k)
+         self%kink_rate(k) = kink_rate(k)
+         self%offset(k) = (self%stiffness(k)*kink(k) + self%damping(k)*kink_rate(k)) - (self%constant(k) + self%friction(k))
+      end do
+   end subroutine set_kinks
 
    !> Lock these hinges and free all others. With quasistatic bending the rotations at which they are held are needed,
    !> except those of relaxing hinges, which are states and stay where they are.
@@ -86,6 +182,7 @@ contains
       given = locked .or. state
       call new_three_moments(series, self%stiffness, self%series%slope, given)
       self%series = series
+      call bend_rods(self)
    end subroutine lock
 
    !> Hinge moments T(0:n); T(n) = 0 at the free end. The opening of hinge k is phi_{k+1} - phi_k (rigid or
@@ -104,20 +201,20 @@ contains
       else if (law%quasistatic) then
          call series_moments(law, n, angle, angle_rate, theta, moment)
       else if (flexible) then
-         call flexible_moments(n, law%stiffness, law%damping, law%kink, law%has_damping, law%has_kinks, &
+         call flexible_moments(n, law%stiffness, law%damping, law%offset, law%has_damping, law%has_offsets, &
                                angle, angle_rate, moment)
       else
-         call rigid_moments(n, law%stiffness, law%damping, law%kink, law%has_damping, law%has_kinks, &
+         call rigid_moments(n, law%stiffness, law%damping, law%offset, law%has_damping, law%has_offsets, &
                             angle, angle_rate, moment)
       end if
    end subroutine hinge_moments
 
-   !> T = C (opening - gamma) + D opening' between rods that bend. One pass: the tangent at the outer end of
+   !> T = C opening + D opening' - offset between rods that bend. One pass: the tangent at the outer end of
    !> rod k, (phi + beta)_k, is kept for the next hinge.
-   pure subroutine flexible_moments(n, stiffness, damping, kink, damped, kinked, angle, angle_rate, moment)
+   pure subroutine flexible_moments(n, stiffness, damping, offset, damped, shifted, angle, angle_rate, moment)
       integer, intent(in) :: n
-      real(wp), intent(in) :: stiffness(0:n - 1), damping(0:n - 1), kink(0:n - 1)
-      logical, intent(in) :: damped, kinked
+      real(wp), intent(in) :: stiffness(0:n - 1), damping(0:n - 1), offset(0:n - 1)
+      logical, intent(in) :: damped, shifted
       real(wp), intent(in) :: angle(n, 3), angle_rate(n, 3) !! phi, alpha, beta and rates
       real(wp), intent(out) :: moment(0:n)
       real(wp) :: outer, outer_rate
@@ -139,14 +236,14 @@ contains
          end do
       end if
       moment(n) = 0.0_wp
-      if (kinked) moment(0:n - 1) = moment(0:n - 1) - stiffness*kink
+      if (shifted) moment(0:n - 1) = moment(0:n - 1) - offset
    end subroutine flexible_moments
 
    !> The same between rigid rods.
-   pure subroutine rigid_moments(n, stiffness, damping, kink, damped, kinked, angle, angle_rate, moment)
+   pure subroutine rigid_moments(n, stiffness, damping, offset, damped, shifted, angle, angle_rate, moment)
       integer, intent(in) :: n
-      real(wp), intent(in) :: stiffness(0:n - 1), damping(0:n - 1), kink(0:n - 1)
-      logical, intent(in) :: damped, kinked
+      real(wp), intent(in) :: stiffness(0:n - 1), damping(0:n - 1), offset(0:n - 1)
+      logical, intent(in) :: damped, shifted
       real(wp), intent(in) :: angle(n), angle_rate(n) !! phi and rates
       real(wp), intent(out) :: moment(0:n)
       integer :: k
@@ -156,7 +253,7 @@ contains
          moment(k) = stiffness(k)*(angle(k + 1) - angle(k))
       end do
       moment(n) = 0.0_wp
-      if (kinked) moment(0:n - 1) = moment(0:n - 1) - stiffness*kink
+      if (shifted) moment(0:n - 1) = moment(0:n - 1) - offset
       if (.not. damped) return
       moment(0) = moment(0) + damping(0)*angle_rate(1)
       do k = 1, n - 1
@@ -185,8 +282,9 @@ contains
       end if
    end subroutine openings
 
-   !> Quasistatic bending: th = G (opening - gamma), T = C th + G^T D G opening', G of the three-moment equation.
-   !> The damping term is what Rayleigh's function sum D (G opening')^2 / 2 gives, so energy balances exactly.
+   !> Quasistatic bending: th = G (opening - gamma - F t0), T = C th + t0 + G^T (D th' + f), th' = G (opening' - gamma'), G of
+   !> the three-moment equation. The damping term is what Rayleigh's function sum D th'^2 / 2 gives, so energy balances
+   !> exactly; friction goes with it.
    pure subroutine series_moments(law, n, angle, angle_rate, theta, moment)
       type(hinge_law), intent(in) :: law
       integer, intent(in) :: n
@@ -195,16 +293,19 @@ contains
       real(wp), intent(out) :: moment(0:n)
 
       call openings(n, .false., angle, theta)
-      if (law%has_kinks) theta = theta - law%kink
+      if (law%has_offsets) theta = theta - (law%kink + law%bent)
       call take_held(law, theta)
       call law%series%solve(theta)
       moment(0:n - 1) = law%stiffness*theta
+      if (law%has_offsets) moment(0:n - 1) = moment(0:n - 1) + law%steady
       moment(n) = 0.0_wp
       call put_at(law%held, theta, moment)
-      if (.not. law%has_damping) return
+      if (.not. (law%has_damping .or. law%has_friction)) return
       call openings(n, .false., angle_rate, theta)
+      if (law%has_offsets) theta = theta - law%kink_rate
       call law%series%solve(theta)
       theta = law%damping*theta
+      if (law%has_friction) theta = theta + law%friction
       call clear_at(law%held, theta)
       call law%series%solve_transposed(theta)
       moment(0:n - 1) = moment(0:n - 1) + theta
@@ -251,12 +352,14 @@ contains
       real(wp), intent(out) :: moment(0:n)
 
       call openings(n, .false., angle, theta)
-      if (law%has_kinks) theta = theta - law%kink
+      if (law%has_offsets) theta = theta - (law%kink + law%bent)
       call take_held(law, theta)
       call moments_of_series(law, n, theta, angle(n + 1:n + size(law%relaxing)), moment)
+      if (law%has_offsets) moment(0:n - 1) = moment(0:n - 1) + law%steady
    end subroutine relaxing_moments
 
-   !> T(0:n) from openings (in `theta`, less what is held) and given rotations of the relaxing hinges.
+   !> T(0:n) from openings (in `theta`, less what is held) and given rotations of the relaxing hinges, without constant
+   !> moments: linear, so it serves changes as well.
    pure subroutine moments_of_series(law, n, theta, given, moment)
       type(hinge_law), intent(in) :: law
       integer, intent(in) :: n
@@ -275,8 +378,25 @@ contains
       call put_at(law%held, theta, moment)
    end subroutine moments_of_series
 
-   !> th' = (T - C th)/D of the relaxing hinges, 0 of locked ones; linear, so it serves changes as well.
+   !> th' = (T - C th - t0 - f)/D of the relaxing hinges, 0 of locked ones.
    pure subroutine relaxation_rates(law, moment, theta, theta_rate)
+      type(hinge_law), intent(in) :: law
+      real(wp), intent(in) :: moment(0:)      !! T (0:n) [N m]
+      real(wp), intent(in) :: theta(:)        !! th of the relaxing hinges [rad]
+      real(wp), intent(out) :: theta_rate(:)  !! [rad/s]
+      integer :: i
+
+      call relaxation_tangent(law, moment, theta, theta_rate)
+      if (.not. law%has_offsets) return
+      do i = 1, size(law%relaxing)
+         associate (k => law%relaxing(i))
+            theta_rate(i) = theta_rate(i) - (law%constant(k) + law%friction(k))/law%damping(k)
+         end associate
+      end do
+   end subroutine relaxation_rates
+
+   !> The same for changes.
+   pure subroutine relaxation_tangent(law, moment, theta, theta_rate)
       type(hinge_law), intent(in) :: law
       real(wp), intent(in) :: moment(0:)      !! T (0:n) [N m]
       real(wp), intent(in) :: theta(:)        !! th of the relaxing hinges [rad]
@@ -288,7 +408,7 @@ contains
          theta_rate(i) = (moment(k) - law%stiffness(k)*theta(i))/law%damping(k)
          if (law%locked(k)) theta_rate(i) = 0.0_wp
       end do
-   end subroutine relaxation_rates
+   end subroutine relaxation_tangent
 
    !> A bound of the rates at which relaxing hinges follow [1/s]: (C + 1/F_min)/D, F_min the smallest eigenvalue of the
    !> flexibility of the rods, by Gershgorin at least the smallest l/(6 EI).
@@ -306,11 +426,12 @@ contains
       real(wp), intent(in) :: phi(:)    !! chord angles (n) [rad]
       real(wp), intent(out) :: theta(:) !! of the relaxing hinges [rad]
       type(three_moments) :: undamped
-      real(wp) :: all_joints(0:law%n - 1)
+      real(wp) :: all_joints(0:law%n - 1), bent(0:law%n - 1)
 
       call new_three_moments(undamped, law%stiffness, law%series%slope, spread(.false., 1, law%n))
       call openings(law%n, .false., phi, all_joints)
-      all_joints = all_joints - law%kink
+      call bend_by(law, law%constant, bent)
+      all_joints = all_joints - (law%kink + bent)
       call undamped%solve(all_joints)
       theta = all_joints(law%relaxing)
    end subroutine initial_joints
@@ -332,7 +453,9 @@ contains
       call openings(n, flexible, angle, theta)
       theta = theta - law%kink
       call openings(n, flexible, angle_rate, theta_rate)
+      theta_rate = theta_rate - law%kink_rate
       if (.not. law%quasistatic) return
+      theta = theta - law%bent
       associate (r => size(law%relaxing))
          if (r > 0) then
             call relaxing_state(law, n, angle(n + 1:n + r), theta, theta_rate, moment, moment_rate)
@@ -342,7 +465,7 @@ contains
       call take_held(law, theta)
       call law%series%solve(theta)
       call law%series%solve(theta_rate)
-      moment(0:n - 1) = law%stiffness*theta
+      moment(0:n - 1) = law%stiffness*theta + law%steady
       moment_rate(0:n - 1) = law%stiffness*theta_rate
       call put_at(law%held, theta, moment)
       call put_at(law%held, theta_rate, moment_rate)
@@ -350,7 +473,8 @@ contains
       call clear_at(law%held, theta_rate)
    end subroutine hinge_state
 
-   !> The same with relaxing hinges; on entry theta and theta_rate hold the openings and their rates.
+   !> The same with relaxing hinges; on entry theta and theta_rate hold the openings from their kinks (and what constant
+   !> moments bend), and their rates.
    pure subroutine relaxing_state(law, n, given, theta, theta_rate, moment, moment_rate)
       type(hinge_law), intent(in) :: law
       integer, intent(in) :: n
@@ -361,6 +485,7 @@ contains
 
       call take_held(law, theta)
       call moments_of_series(law, n, theta, given, moment)
+      moment(0:n - 1) = moment(0:n - 1) + law%steady
       call relaxation_rates(law, moment, given, rate)
       call moments_of_series(law, n, theta_rate, rate, moment_rate)
       theta(law%held) = law%held_at
@@ -378,11 +503,26 @@ contains
       real(wp), intent(out) :: theta_rate(0:n - 1) !! th' [rad/s]
 
       call openings(n, flexible, angle_rate, theta_rate)
+      if (law%driven) theta_rate = theta_rate - law%kink_rate
       if (law%quasistatic) call law%series%solve(theta_rate)
       call clear_at(law%held, theta_rate)
    end subroutine hinge_rates
 
-   !> Change of the hinge moments for a change of angles and rates (the law is linear but for the kinks). Reactions of
+   !> Energy of all springs [J].
+   pure real(wp) function spring_energy(law, theta)
+      type(hinge_law), intent(in) :: law
+      real(wp), intent(in) :: theta(0:) !! th (0:n-1) [rad]
+      integer :: i
+
+      spring_energy = 0.5_wp*sum(law%stiffness*theta**2)
+      do i = 1, size(law%mechanisms)
+         associate (mechanism => law%mechanisms(i), k => law%mechanisms(i)%hinge)
+            spring_energy = spring_energy + (mechanism%energy(theta(k)) - 0.5_wp*law%stiffness(k)*theta(k)**2)
+         end associate
+      end do
+   end function spring_energy
+
+   !> Change of the hinge moments for a change of angles and rates (the law is linear but for its offset). Reactions of
    !> locked hinges are left out where the kernels find them.
    pure subroutine hinge_tangent(law, n, flexible, d_angle, d_angle_rate, work, d_moment)
       type(hinge_law), intent(in) :: law

@@ -13,6 +13,7 @@ module rodyn_scene
    use rodyn_spacecraft, only: spacecraft_body
    use rodyn_hinge_law, only: hinge_law, new_hinge_law
    use rodyn_loads, only: load_set, new_load_set
+   use rodyn_kink_program, only: kink_set, new_kink_set
    implicit none (type, external)
    private
    public :: scene_type, new_scene
@@ -34,6 +35,8 @@ module rodyn_scene
       integer, allocatable :: rod_of(:)        !! which of them is rod k (1:n)
       type(hinge_law) :: hinges
       type(load_set) :: loads
+      type(kink_set) :: kinks
+      real(wp), allocatable :: switches(:)     !! all times within the run where a force, kink or lock is not smooth, in order [s]
    contains
       procedure :: phi_at
       procedure :: alpha_at
@@ -92,10 +95,30 @@ contains
       if (allocated(error)) return
       call compile_nodes(scene, config, error)
       if (allocated(error)) return
-      call new_hinge_law(scene%hinges, config%chain, scene%quasistatic, config%model%dampers == 'exact')
+      call new_kink_set(scene%kinks, config%chain%kink, config%kink_programs, config%t_end)
+      call new_hinge_law(scene%hinges, config%chain, scene%quasistatic, config%model%dampers == 'exact', &
+                         size(scene%kinks%programs) > 0, config%hinges)
       scene%n_q = scene%n_dof + size(scene%hinges%relaxing)
       call new_load_set(scene%loads, config%loads, config%t_end)
+      call collect_switches(scene, config%t_end)
    end subroutine new_scene
+
+   !> Switches of loads, kinks and releases.
+   subroutine collect_switches(scene, t_end)
+      type(scene_type), intent(inout) :: scene
+      real(wp), intent(in) :: t_end !! [s]
+      real(wp), allocatable :: all_times(:)
+      real(wp) :: next
+
+      all_times = [scene%loads%switches, scene%kinks%switches, scene%hinges%mechanisms%release_time]
+      all_times = pack(all_times, all_times > 0.0_wp .and. all_times < t_end)
+      allocate (scene%switches(0))
+      do while (size(all_times) > 0)
+         next = minval(all_times)
+         scene%switches = [scene%switches, next]
+         all_times = pack(all_times, all_times > next)
+      end do
+   end subroutine collect_switches
 
    !> What a combination of choices forbids, MODEL sec. 5.
    subroutine check_combination(config, error)

@@ -243,6 +243,7 @@ contains
       if (.not. allocated(error)) call new_motion(motion, scene, .false., error)
       if (allocated(error)) return
       t_end = config%t_end
+      motion%events%most = config%solver%max_events
       call initial_state(motion, config%initial, y)
       call choose_method(choice, config%solver, options_of(config), scene, y, t_end)
       keeper%row = new_run_row(scene%n)

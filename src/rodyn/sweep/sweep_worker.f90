@@ -90,8 +90,14 @@ contains
       type(sweep_config), intent(in) :: sweep
       type(sweep_plan), intent(in) :: plan
       uses_lanes = .false.
-      if (sweep%lanes) uses_lanes = fewest_alike(sweep, plan) >= worthwhile
+      if (sweep%lanes .and. .not. hinges_move(sweep)) uses_lanes = fewest_alike(sweep, plan) >= worthwhile
    end function uses_lanes
+
+   !> Do hinges have switches and events of their own, which differ from case to case?
+   pure logical function hinges_move(sweep)
+      type(sweep_config), intent(in) :: sweep
+      hinges_move = size(sweep%base_case%kink_programs) + size(sweep%base_case%hinges) > 0
+   end function hinges_move
 
    !> The same in words.
    function lanes_text(sweep, plan) result(text)
@@ -100,6 +106,8 @@ contains
       character(len=:), allocatable :: text
       if (uses_lanes(sweep, plan)) then
          text = 'like cases by dop853 side by side in '//to_text(lanes)//' lanes, others one by one'
+      else if (sweep%lanes .and. hinges_move(sweep)) then
+         text = 'one by one (hinges move by programs or have events)'
       else if (sweep%lanes) then
          text = 'one by one (too few cases are alike)'
       else

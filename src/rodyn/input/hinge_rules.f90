@@ -1,0 +1,214 @@
+!> Rules of moving scenes: which keys of `&kink_program` and `&hinge` go together.
+module rodyn_hinge_rules
+   use rodyn_kinds, only: wp
+   use rodyn_case_config, only: case_config, hinge_config, kink_config, none_given
+   use rodyn_case_fields, only: kink_law_takes
+   use rodyn_checked_document, only: checked_document, blame, entry_of, is_sound
+   use rodyn_text, only: to_text
+   implicit none (type, external)
+   private
+   public :: check_moving_hinges
+
+   character(len=*), parameter :: law_keys(6) = [character(len=7) :: 't_start', 't_end', 'value', 'rate', 'times', 'values']
+
+contains
+
+   !> Note everything that is wrong with programs of kinks and laws of hinges.
+   subroutine check_moving_hinges(checked, config)
+      type(checked_document), intent(inout) :: checked
+      type(case_config), intent(in) :: config
+      integer :: i
+
+      do i = 1, size(config%kink_programs)
+         call check_exists(checked, 'kink_program', i, 'hinge', config%kink_programs(i)%hinge, config%chain%n_rods)
+         call check_law_keys(checked, i, config%kink_programs(i))
+         call check_program_times(checked, i, config%kink_programs(i))
+         call check_jumps(checked, i, config%kink_programs(i), config)
+      end do
+      do i = 1, size(config%hinges)
+         call check_exists(checked, 'hinge', i, 'hinge', config%hinges(i)%hinge, config%chain%n_rods)
+         call check_once(checked, i, config%hinges)
+         call check_release(checked, i, config%hinges)
+         call check_stops(checked, i, config%hinges(i))
+         call check_friction(checked, i, config%hinges(i))
+         call check_dampers(checked, i, config%hinges(i), config)
+      end do
+   end subroutine check_moving_hinges
+
+   !> Is the key given, rightly or wrongly?
+   logical function given(checked, group, instance, key)
+      type(checked_document), intent(in) :: checked
+      character(len=*), intent(in) :: group, key
+      integer, intent(in) :: instance
+      given = entry_of(checked, group, instance, key, any_state=.true.) > 0
+   end function given
+
+   subroutine check_exists(checked, group, i, key, hinge, n_rods)
+      type(checked_document), intent(inout) :: checked
+      character(len=*), intent(in) :: group, key
+      integer, intent(in) :: i, hinge, n_rods !! n_rods 0: not known
+      if (n_rods < 1 .or. hinge < n_rods) return
+      if (.not. is_sound(checked, group, i, key)) return
+      call blame(checked, group, i, key, 'there is no such hinge; they are numbered 0..'//to_text(n_rods - 1))
+   end subroutine check_exists
+
+   !> Each law has its own keys and takes no others.
+   subroutine check_law_keys(checked, i, program)
+      type(checked_document), intent(inout) :: checked
+      integer, intent(in) :: i
+      type(kink_config), intent(in) :: program
+      character(len=:), allocatable :: key
+      integer :: k
+
+      if (.not. is_sound(checked, 'kink_program', i, 'law')) return
+      do k = 1, size(law_keys)
+         key = trim(law_keys(k))
+         if (.not. kink_law_takes(program%law, key)) then
+            if (given(checked, 'kink_program', i, key)) call blame(checked, 'kink_program', i, key, &
+               "does not go with law = '"//trim(program%law)//"'")
+         else if (k > 2 .and. .not. given(checked, 'kink_program', i, key)) then ! the times have defaults
+            call blame(checked, 'kink_program', i, key, "is required when law = '"//trim(program%law)//"'")
+         end if
+      end do
+   end subroutine check_law_keys
+
+   !> A program must not end before it begins; only a ramp may be a step. Tables have values at times that increase.
+   subroutine check_program_times(checked, i, program)
+      type(checked_document), intent(inout) :: checked
+      integer, intent(in) :: i
+      type(kink_config), intent(in) :: program
+
+      if (program%law == 'table') then
+         if (entry_of(checked, 'kink_program', i, 'times') == 0) return
+         if (size(program%times) < 2) then
+            call blame(checked, 'kink_program', i, 'times', 'must be two values at least')
+         else if (any(program%times(2:) <= program%times(:size(program%times) - 1))) then
+            call blame(checked, 'kink_program', i, 'times', 'must increase')
+         end if
+         if (entry_of(checked, 'kink_program', i, 'values') > 0 .and. size(program%values) /= size(program%times)) &
+            call blame(checked, 'kink_program', i, 'values', 'must be as many as times: '//to_text(size(program%times)) &
+                       //', not '//to_text(size(program%values)))
+         return
+      end if
+      if (.not. (is_sound(checked, 'kink_program', i, 't_start') .and. is_sound(checked, 'kink_program', i, 't_end'))) return
+      if (program%t_start > program%t_end) then
+         call blame(checked, 'kink_program', i, 't_start', 'must not be after t_end')
+      else if (program%t_start >= program%t_end .and. program%law /= 'ramp') then
+         call blame(checked, 'kink_program', i, 't_start', "must be before t_end; only law = 'ramp' may be a step")
+      end if
+   end subroutine check_program_times
+
+   !> A kink that jumps would strike a damper or a lock with infinite force; so would one whose rate jumps a lock.
+   subroutine check_jumps(checked, i, program, config)
+      type(checked_document), intent(inout) :: checked
+      integer, intent(in) :: i
+      type(kink_config), intent(in) :: program
+      type(case_config), intent(in) :: config
+      logical :: step
+      integer :: h
+
+      if (.not. is_sound(checked, 'kink_program', i, 'hinge') .or. .not. is_sound(checked, 'kink_program', i, 'law')) return
+      step = program%law == 'ramp' .and. program%t_start >= program%t_end
+      if (step .and. is_sound(checked, 'chain', 1, 'hinge_damping') .and. &
+          program%hinge < min(config%chain%n_rods, size(config%chain%hinge_damping))) then
+         if (config%chain%hinge_damping(program%hinge) > 0.0_wp) call blame(checked, 'kink_program', i, 'hinge', &
+            'a step of the kink needs a hinge without hinge_damping')
+      end if
+      do h = 1, size(config%hinges)
+         associate (hinge => config%hinges(h))
+            if (hinge%hinge /= program%hinge) cycle
+            if (step .and. max(hinge%stop_damping, hinge%lock_damping) > 0.0_wp) call blame(checked, 'kink_program', i, 'hinge', &
+               'a step of the kink needs a hinge without stop_damping and lock_damping')
+            if (hinge%lock_stiffness > 0.0_wp .or. .not. (hinge%held .or. hinge%latch_angle < none_given)) cycle
+            if (program%law == 'ramp' .or. program%law == 'sine') call blame(checked, 'kink_program', i, 'law', &
+               "must be 'smooth_step' or 'table' at a hinge that is held or latches: its rate must not jump")
+         end associate
+      end do
+   end subroutine check_jumps
+
+   subroutine check_once(checked, i, hinges)
+      type(checked_document), intent(inout) :: checked
+      integer, intent(in) :: i
+      type(hinge_config), intent(in) :: hinges(:)
+      if (.not. is_sound(checked, 'hinge', i, 'hinge')) return
+      if (any(hinges(:i - 1)%hinge == hinges(i)%hinge)) call blame(checked, 'hinge', i, 'hinge', &
+         'this hinge has a group &hinge already')
+   end subroutine check_once
+
+   !> Only what is held can be released, by one cause, and only what latches can release others.
+   subroutine check_release(checked, i, hinges)
+      type(checked_document), intent(inout) :: checked
+      integer, intent(in) :: i
+      type(hinge_config), intent(in) :: hinges(:)
+      logical :: by_time, by_latch
+      integer :: k
+
+      by_time = given(checked, 'hinge', i, 'release_time')
+      by_latch = given(checked, 'hinge', i, 'release_after')
+      if (is_sound(checked, 'hinge', i, 'held') .and. .not. hinges(i)%held) then
+         if (by_time) call blame(checked, 'hinge', i, 'release_time', 'goes with held = .true. only')
+         if (by_latch) call blame(checked, 'hinge', i, 'release_after', 'goes with held = .true. only')
+         return
+      end if
+      if (by_time .and. by_latch) call blame(checked, 'hinge', i, 'release_after', 'excludes release_time')
+      if (.not. by_latch .or. .not. is_sound(checked, 'hinge', i, 'release_after')) return
+      do k = 1, size(hinges)
+         if (hinges(k)%hinge == hinges(i)%release_after .and. hinges(k)%latch_angle < none_given .and. k /= i) return
+      end do
+      call blame(checked, 'hinge', i, 'release_after', 'that hinge must have a latch_angle of its own')
+   end subroutine check_release
+
+   subroutine check_stops(checked, i, hinge)
+      type(checked_document), intent(inout) :: checked
+      integer, intent(in) :: i
+      type(hinge_config), intent(in) :: hinge
+
+      if (hinge%lower_stop < none_given .and. hinge%upper_stop < none_given .and. hinge%lower_stop >= hinge%upper_stop) &
+         call blame(checked, 'hinge', i, 'upper_stop', 'must be greater than lower_stop')
+      if (min(hinge%lower_stop, hinge%upper_stop) < none_given) then
+         if (.not. hinge%stop_stiffness > 0.0_wp .and. is_sound(checked, 'hinge', i, 'stop_stiffness')) &
+            call blame(checked, 'hinge', i, 'stop_stiffness', 'is required with a stop, and positive')
+      else if (hinge%stop_stiffness > 0.0_wp .or. hinge%stop_damping > 0.0_wp) then
+         if (is_sound(checked, 'hinge', i, 'lower_stop') .and. is_sound(checked, 'hinge', i, 'upper_stop')) &
+            call blame(checked, 'hinge', i, 'stop_stiffness', 'goes with lower_stop or upper_stop only')
+      end if
+      if (hinge%freeplay_stiffness > 0.0_wp .and. .not. hinge%freeplay > 0.0_wp) &
+         call blame(checked, 'hinge', i, 'freeplay_stiffness', 'goes with freeplay only')
+      if (hinge%lock_damping > 0.0_wp .and. .not. hinge%lock_stiffness > 0.0_wp) &
+         call blame(checked, 'hinge', i, 'lock_damping', 'goes with lock_stiffness only')
+   end subroutine check_stops
+
+   subroutine check_friction(checked, i, hinge)
+      type(checked_document), intent(inout) :: checked
+      integer, intent(in) :: i
+      type(hinge_config), intent(in) :: hinge
+
+      if (.not. (is_sound(checked, 'hinge', i, 'friction_moment') .and. &
+                 is_sound(checked, 'hinge', i, 'friction_velocity'))) return
+      if (hinge%friction_moment > 0.0_wp .and. .not. hinge%friction_velocity > 0.0_wp) then
+         call blame(checked, 'hinge', i, 'friction_velocity', 'is required when friction_moment > 0')
+      else if (hinge%friction_velocity > 0.0_wp .and. .not. hinge%friction_moment > 0.0_wp) then
+         call blame(checked, 'hinge', i, 'friction_velocity', 'goes with friction_moment only')
+      end if
+   end subroutine check_friction
+
+   !> Exact dampers make a state of the rotation of each damped hinge. Damping must not come and go there.
+   subroutine check_dampers(checked, i, hinge, config)
+      type(checked_document), intent(inout) :: checked
+      integer, intent(in) :: i
+      type(hinge_config), intent(in) :: hinge
+      type(case_config), intent(in) :: config
+
+      if (config%model%bending /= 'quasistatic' .or. config%model%dampers /= 'exact') return
+      if (hinge%held .or. hinge%latch_angle < none_given) then
+         call blame(checked, 'hinge', i, 'hinge', "held hinges and latches do not go with dampers = 'exact'")
+         return
+      end if
+      if (.not. max(hinge%stop_damping, hinge%friction_moment) > 0.0_wp) return
+      if (.not. is_sound(checked, 'chain', 1, 'hinge_damping')) return
+      if (hinge%hinge >= min(config%chain%n_rods, size(config%chain%hinge_damping))) return
+      if (.not. config%chain%hinge_damping(hinge%hinge) > 0.0_wp) call blame(checked, 'hinge', i, 'hinge', &
+         "with dampers = 'exact', stop_damping and friction_moment need a hinge with hinge_damping")
+   end subroutine check_dampers
+
+end module rodyn_hinge_rules

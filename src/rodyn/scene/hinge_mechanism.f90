@@ -1,0 +1,324 @@
+!> Hinges that are more than a spring and a damper: freeplay, stops, dry friction, locks, SPEC `&hinge`.
+!>
+!> Between events every such hinge is linear again,
+!>     T = C th + D th' + t0 + f,
+!> with f the moment of sliding friction. Its parts, for the joint rotation th:
+!> - spring with rest angle a and freeplay g: Ci (th - a) for |th - a| < g, +-Ci g + C (th - a -+ g) beyond;
+!> - stops: Cs d + Ds d' with d the depth in the stop. They push but never pull: the stop is left when that moment vanishes (when
+!>   d does, where dampers bend no rods: `reduced` dampers of quasistatic bending). Its face then follows by itself,
+!>   d_face = d0 exp(-Cs (t - t0)/Ds), and may be met again;
+!> - dry friction F, regularised: F th'/vf while |th'| < vf (sticks), F sign(th') beyond (slides);
+!> - a lock: th stays (a constraint), or a spring and damper about the angle where it locked.
+!> What is left in a stop's face or a lock's spring when it is left is lost, and booked at that event.
+!>
+!> Each law holds while its margins are positive; an event is a margin that has become negative. A hinge changes its law
+!> only `hysteresis` beyond the point where two laws meet, so that rounding cannot make it change back at once.
+module rodyn_hinge_mechanism
+   use rodyn_kinds, only: wp
+   use rodyn_case_config, only: chain_config, hinge_config, none_given
+   implicit none (type, external)
+   private
+   public :: hinge_mechanism, new_mechanism
+   public :: part_spring, part_lower, part_upper, part_friction, part_latch, n_parts
+   public :: kind_names, kind_released, kind_latched, kind_kink_step
+
+   !> Parts of a mechanism that have a margin.
+   integer, parameter :: part_spring = 1, part_lower = 2, part_upper = 3, part_friction = 4, part_latch = 5, n_parts = 5
+
+   !> Kinds of events.
+   integer, parameter :: kind_released = 1, kind_latched = 2, kind_kink_step = 3, kind_in_freeplay = 4, kind_out_of_freeplay = 5, &
+      kind_at_lower = 6, kind_off_lower = 7, kind_at_upper = 8, kind_off_upper = 9, kind_slides = 10, kind_sticks = 11
+   character(len=*), parameter :: kind_names(11) = [character(len=16) :: 'released', 'latched', 'kink_step', 'in_freeplay', &
+      'out_of_freeplay', 'at_lower_stop', 'off_lower_stop', 'at_upper_stop', 'off_upper_stop', 'slides', 'sticks']
+
+   real(wp), parameter :: hysteresis = 1.0e-12_wp !! [rad], [rad/s]
+
+   !> One hinge: what it is, and (from `side` on) the law it has now.
+   type :: hinge_mechanism
+      integer :: hinge = 0
+      real(wp) :: stiffness = 0.0_wp        !! C [N m/rad]
+      real(wp) :: damping = 0.0_wp          !! D [N m s/rad]
+      real(wp) :: rest = 0.0_wp             !! a [rad]
+      real(wp) :: freeplay = 0.0_wp         !! g [rad]
+      real(wp) :: inner_stiffness = 0.0_wp  !! Ci [N m/rad]
+      real(wp) :: stop(2) = [-none_given, none_given] !! lower and upper [rad]
+      real(wp) :: stop_stiffness = 0.0_wp   !! Cs [N m/rad]
+      real(wp) :: stop_damping = 0.0_wp     !! Ds [N m s/rad]
+      real(wp) :: friction = 0.0_wp         !! F [N m]
+      real(wp) :: friction_velocity = 0.0_wp !! vf [rad/s]
+      real(wp) :: latch = none_given        !! [rad]
+      real(wp) :: lock_stiffness = 0.0_wp   !! 0: a constraint [N m/rad]
+      real(wp) :: lock_damping = 0.0_wp     !! [N m s/rad]
+      logical :: held = .false.             !! locked at the start
+      real(wp) :: release_time = none_given !! [s]
+      integer :: release_after = -1
+      logical :: dampers_apart = .false.    !! dampers bend no rods (reduced dampers): stops are left at their angle
+      integer :: side = 0                   !! of the freeplay: -1, 0 within, 1
+      logical :: touches(2) = .false.       !! lower, upper stop
+      real(wp) :: face(2) = 0.0_wp          !! depth of a stop's face where it was left [rad]
+      real(wp) :: left(2) = 0.0_wp          !! when [s]
+      integer :: slides = 0                 !! 0: sticks; else the sign of th'
+      logical :: locked = .false.
+      real(wp) :: lock_angle = 0.0_wp       !! [rad]
+      integer :: latch_side = 0             !! sign of the way to the latch; 0: none, or latched
+   contains
+      procedure :: settle
+      procedure :: margin
+      procedure :: change
+      procedure :: lock
+      procedure :: release
+      procedure :: linear_law
+      procedure :: energy
+      procedure :: is_constrained
+   end type hinge_mechanism
+
+contains
+
+   !> Take over what is given of a hinge. Its law is that of the bare spring until `settle`.
+   pure subroutine new_mechanism(self, given, chain, dampers_apart)
+      type(hinge_mechanism), intent(out) :: self
+      type(hinge_config), intent(in) :: given
+      type(chain_config), intent(in) :: chain
+      logical, intent(in) :: dampers_apart !! see there
+
+      self%dampers_apart = dampers_apart
+      self%hinge = given%hinge
+      self%stiffness = chain%hinge_stiffness(lbound(chain%hinge_stiffness, 1) + given%hinge)
+      self%damping = chain%hinge_damping(lbound(chain%hinge_damping, 1) + given%hinge)
+      self%rest = given%rest_angle
+      self%freeplay = given%freeplay
+      self%inner_stiffness = given%freeplay_stiffness
+      if (given%lower_stop < none_given) self%stop(1) = given%lower_stop
+      if (given%upper_stop < none_given) self%stop(2) = given%upper_stop
+      self%stop_stiffness = given%stop_stiffness
+      self%stop_damping = given%stop_damping
+      self%friction = given%friction_moment
+      self%friction_velocity = given%friction_velocity
+      self%latch = given%latch_angle
+      self%lock_stiffness = given%lock_stiffness
+      self%lock_damping = given%lock_damping
+      self%held = given%held
+      self%release_time = given%release_time
+      self%release_after = given%release_after
+      self%side = merge(0, 1, given%freeplay > 0.0_wp)
+   end subroutine new_mechanism
+
+   !> Choose the laws that hold at a state: at the start, and after a jump of it.
+   pure subroutine settle(self, theta, theta_rate)
+      class(hinge_mechanism), intent(inout) :: self
+      real(wp), intent(in) :: theta, theta_rate !! th [rad], th' [rad/s]
+      integer :: i
+
+      if (self%freeplay > 0.0_wp) then
+         self%side = 0
+         if (abs(theta - self%rest) > self%freeplay) self%side = merge(1, -1, theta > self%rest)
+      end if
+      do i = 1, 2
+         self%touches(i) = depth(self, i, theta) > 0.0_wp .and. push(self, i, theta, theta_rate) > 0.0_wp
+         self%face(i) = 0.0_wp
+      end do
+      if (self%friction > 0.0_wp) then
+         self%slides = 0
+         if (abs(theta_rate) > self%friction_velocity) self%slides = merge(1, -1, theta_rate > 0.0_wp)
+      end if
+   end subroutine settle
+
+   !> Depth in the lower or upper stop.
+   pure real(wp) function depth(self, i, theta)
+      type(hinge_mechanism), intent(in) :: self
+      integer, intent(in) :: i
+      real(wp), intent(in) :: theta
+      depth = merge(self%stop(1) - theta, theta - self%stop(2), i == 1)
+   end function depth
+
+   !> Moment of a stop, divided by its stiffness [rad].
+   pure real(wp) function push(self, i, theta, theta_rate)
+      type(hinge_mechanism), intent(in) :: self
+      integer, intent(in) :: i
+      real(wp), intent(in) :: theta, theta_rate
+      push = 0.0_wp
+      if (.not. self%stop_stiffness > 0.0_wp) return
+      push = depth(self, i, theta)
+      if (.not. self%dampers_apart) push = push + self%stop_damping/self%stop_stiffness*merge(-theta_rate, theta_rate, i == 1)
+   end function push
+
+   !> Where the face of a stop is, by itself [rad].
+   pure real(wp) function face_depth(self, i, t)
+      type(hinge_mechanism), intent(in) :: self
+      integer, intent(in) :: i
+      real(wp), intent(in) :: t
+      face_depth = 0.0_wp
+      if (self%face(i) > 0.0_wp .and. self%stop_damping > 0.0_wp) &
+         face_depth = self%face(i)*exp(-min(self%stop_stiffness*(t - self%left(i))/self%stop_damping, 500.0_wp))
+   end function face_depth
+
+   !> Margin of the law of a part: negative once it no longer holds [rad] or [rad/s].
+   pure real(wp) function margin(self, part, t, theta, theta_rate)
+      class(hinge_mechanism), intent(in) :: self
+      integer, intent(in) :: part
+      real(wp), intent(in) :: t, theta, theta_rate
+      integer :: i
+
+      margin = 1.0_wp
+      if (self%is_constrained()) return
+      select case (part)
+      case (part_spring)
+         if (self%side == 0) then
+            margin = self%freeplay - abs(theta - self%rest)
+         else
+            margin = self%side*(theta - self%rest) - self%freeplay
+         end if
+      case (part_lower, part_upper)
+         i = part - part_lower + 1
+         if (self%touches(i)) then
+            margin = push(self, i, theta, theta_rate)
+         else
+            margin = face_depth(self, i, t) - depth(self, i, theta)
+         end if
+      case (part_friction)
+         if (self%slides == 0) then
+            margin = self%friction_velocity - abs(theta_rate)
+         else
+            margin = self%slides*theta_rate - self%friction_velocity
+         end if
+      case (part_latch)
+         if (self%latch_side /= 0) margin = self%latch_side*(self%latch - theta)
+         return ! the angle itself, not beyond
+      case default ! there is no other part
+         return
+      end select
+      margin = margin + hysteresis
+   end function margin
+
+   !> The margin of a part other than the latch has become negative: take the law on the other side.
+   pure subroutine change(self, part, t, theta, theta_rate, kind, lost)
+      class(hinge_mechanism), intent(inout) :: self
+      integer, intent(in) :: part
+      real(wp), intent(in) :: t, theta, theta_rate
+      integer, intent(out) :: kind
+      real(wp), intent(out) :: lost !! energy [J]
+      integer :: i
+
+      lost = 0.0_wp
+      kind = 0
+      select case (part)
+      case (part_spring)
+         if (self%side == 0) then
+            self%side = merge(1, -1, theta > self%rest)
+            kind = kind_out_of_freeplay
+         else
+            self%side = 0
+            kind = kind_in_freeplay
+         end if
+      case (part_lower, part_upper)
+         i = part - part_lower + 1
+         self%touches(i) = .not. self%touches(i)
+         lost = 0.5_wp*self%stop_stiffness*depth(self, i, theta)**2
+         if (self%touches(i)) then
+            lost = -lost ! what the face still held
+            kind = merge(kind_at_lower, kind_at_upper, i == 1)
+         else
+            self%face(i) = max(depth(self, i, theta), 0.0_wp)
+            self%left(i) = t
+            kind = merge(kind_off_lower, kind_off_upper, i == 1)
+         end if
+      case (part_friction)
+         if (self%slides == 0) then
+            self%slides = merge(1, -1, theta_rate > 0.0_wp)
+            kind = kind_slides
+         else
+            self%slides = 0
+            kind = kind_sticks
+         end if
+      case default ! a latch has no other law
+         return
+      end select
+   end subroutine change
+
+   !> Lock at the present angle.
+   pure subroutine lock(self, theta)
+      class(hinge_mechanism), intent(inout) :: self
+      real(wp), intent(in) :: theta
+      self%locked = .true.
+      self%lock_angle = theta
+   end subroutine lock
+
+   !> Release; what a lock's spring holds is lost.
+   pure subroutine release(self, theta, lost)
+      class(hinge_mechanism), intent(inout) :: self
+      real(wp), intent(in) :: theta
+      real(wp), intent(out) :: lost !! [J]
+      lost = 0.5_wp*self%lock_stiffness*(theta - self%lock_angle)**2
+      self%locked = .false.
+   end subroutine release
+
+   !> Locked, and not by a spring?
+   elemental logical function is_constrained(self)
+      class(hinge_mechanism), intent(in) :: self
+      is_constrained = self%locked .and. .not. self%lock_stiffness > 0.0_wp
+   end function is_constrained
+
+   !> The law as it is now: T = C th + D th' + t0 + f.
+   pure subroutine linear_law(self, stiffness, damping, constant, friction)
+      class(hinge_mechanism), intent(in) :: self
+      real(wp), intent(out) :: stiffness, damping !! C, D
+      real(wp), intent(out) :: constant           !! t0 [N m]
+      real(wp), intent(out) :: friction           !! f [N m]
+      integer :: i
+
+      stiffness = 0.0_wp
+      constant = 0.0_wp
+      damping = self%damping
+      friction = 0.0_wp
+      if (self%freeplay > 0.0_wp) call add_spring(self%inner_stiffness, self%rest, stiffness, constant)
+      if (self%side /= 0) call add_spring(merge(self%stiffness - self%inner_stiffness, self%stiffness, self%freeplay > 0.0_wp), &
+                                          self%rest + self%side*self%freeplay, stiffness, constant)
+      do i = 1, 2
+         if (.not. self%touches(i)) cycle
+         call add_spring(self%stop_stiffness, self%stop(i), stiffness, constant)
+         damping = damping + self%stop_damping
+      end do
+      if (self%locked) then
+         call add_spring(self%lock_stiffness, self%lock_angle, stiffness, constant)
+         damping = damping + self%lock_damping
+      end if
+      if (.not. self%friction > 0.0_wp .or. self%is_constrained()) return
+      if (self%slides == 0) then
+         damping = damping + self%friction/self%friction_velocity
+      else
+         friction = self%slides*self%friction
+      end if
+   end subroutine linear_law
+
+   !> T = C th + t0 of one more spring.
+   pure subroutine add_spring(c, slack, stiffness, constant)
+      real(wp), intent(in) :: c, slack
+      real(wp), intent(inout) :: stiffness, constant
+      stiffness = stiffness + c
+      constant = constant - c*slack
+   end subroutine add_spring
+
+   !> Energy of its springs, as sums of squares: the differences of a parabola's coefficients would lose digits.
+   pure real(wp) function energy(self, theta)
+      class(hinge_mechanism), intent(in) :: self
+      real(wp), intent(in) :: theta
+      real(wp) :: e
+      integer :: i
+
+      e = theta - self%rest
+      if (self%side == 0) then
+         energy = 0.5_wp*self%inner_stiffness*e**2
+      else if (self%freeplay > 0.0_wp) then
+         associate (beyond => self%side*e - self%freeplay)
+            energy = 0.5_wp*self%stiffness*beyond**2 + self%inner_stiffness*self%freeplay*(beyond + 0.5_wp*self%freeplay)
+         end associate
+      else
+         energy = 0.5_wp*self%stiffness*e**2
+      end if
+      do i = 1, 2
+         if (self%touches(i)) energy = energy + 0.5_wp*self%stop_stiffness*depth(self, i, theta)**2
+      end do
+      if (self%locked) energy = energy + 0.5_wp*self%lock_stiffness*(theta - self%lock_angle)**2
+   end function energy
+
+end module rodyn_hinge_mechanism
