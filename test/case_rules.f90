@@ -32,8 +32,44 @@ contains
          new_test('rods that bend as motion need mass and two Gauss points', bending_needs_mass), &
          new_test('a rod and its outer node are not both without mass', massless_rod), &
          new_test('each method has its orders', orders), &
+         new_test('programs of kinks keep their rules', kink_rules), &
+         new_test('laws of hinges keep their rules', hinge_rules), &
          new_test('a free spacecraft needs mass and inertia', free_needs_mass)]
    end subroutine collect_case_rules
+
+   subroutine kink_rules(error)
+      type(error_type), allocatable, intent(out) :: error
+      call expect_faults(error, valid//'&kink_program hinge = 4, value = 1 /'//nl// &
+         "&kink_program hinge = 0, law = 'sine', value = 1 /"//nl// &
+         "&kink_program hinge = 0, law = 'table', value = 1, times = 0, 0, values = 1 /"//nl// &
+         '&kink_program hinge = 1, value = 1, t_start = 1 /'//nl// &
+         "&kink_program hinge = 2, law = 'ramp', value = 1 /"//nl//'&hinge hinge = 2, held = .true. /', &
+         'c.nml:3: &kink_program hinge = 4: there is no such hinge; they are numbered 0..3'//nl// &
+         "c.nml:4: &kink_program rate: is required when law = 'sine'"//nl// &
+         "c.nml:5: &kink_program value = 1: does not go with law = 'table'"//nl// &
+         'c.nml:5: &kink_program times = 0, 0: must increase'//nl// &
+         'c.nml:5: &kink_program values = 1: must be as many as times: 2, not 1'//nl// &
+         "c.nml:6: &kink_program t_start = 1: must be before t_end; only law = 'ramp' may be a step"//nl// &
+         "c.nml:7: &kink_program law = 'ramp': must be 'smooth_step' or 'table' at a hinge that is held or latches: "// &
+         'its rate must not jump')
+   end subroutine kink_rules
+
+   subroutine hinge_rules(error)
+      type(error_type), allocatable, intent(out) :: error
+      call expect_faults(error, valid//'&hinge hinge = 0, release_time = 1 /'//nl// &
+         '&hinge hinge = 0, held = .true., release_after = 3 /'//nl// &
+         '&hinge hinge = 1, lower_stop = 0.1, upper_stop = -0.1 /'//nl// &
+         '&hinge hinge = 2, friction_moment = 1 /'//nl// &
+         '&hinge hinge = 3, lock_damping = 1, freeplay_stiffness = 1 /', &
+         'c.nml:3: &hinge release_time = 1: goes with held = .true. only'//nl// &
+         'c.nml:4: &hinge hinge = 0: this hinge has a group &hinge already'//nl// &
+         'c.nml:4: &hinge release_after = 3: that hinge must have a latch_angle of its own'//nl// &
+         'c.nml:5: &hinge upper_stop = -0.1: must be greater than lower_stop'//nl// &
+         'c.nml:5: &hinge stop_stiffness: is required with a stop, and positive'//nl// &
+         'c.nml:6: &hinge friction_velocity: is required when friction_moment > 0'//nl// &
+         'c.nml:7: &hinge freeplay_stiffness = 1: goes with freeplay only'//nl// &
+         'c.nml:7: &hinge lock_damping = 1: goes with lock_stiffness only')
+   end subroutine hinge_rules
 
    subroutine dynamic_lumped(error)
       type(error_type), allocatable, intent(out) :: error

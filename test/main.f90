@@ -16,6 +16,7 @@ program tester
    use test_locks, only: collect_locks
    use test_method_choice, only: collect_method_choice
    use test_motion, only: collect_motion
+   use test_moving, only: collect_moving
    use test_newton, only: collect_newton
    use test_namelist, only: collect_namelist
    use test_namelist_faults, only: collect_namelist_faults
@@ -46,6 +47,7 @@ program tester
    call run('locks', collect_locks)
    call run('lanes', collect_lanes)
    call run('motion', collect_motion)
+   call run('moving', collect_moving)
    call run('newton', collect_newton)
    call run('integrators', collect_integrators)
    call run('gauss', collect_gauss)

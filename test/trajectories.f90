@@ -7,6 +7,8 @@ module test_trajectories
    use rodyn_motion, only: motion_type, new_motion, initial_state, state_invariants
    use rodyn_kinematics, only: invariants_type
    use rodyn_ledger, only: fill_row
+   use rodyn_user_load, only: user_load
+   use rodyn_hinge_events, only: hinge_event
    use rodyn_run_file, only: run_row, new_run_row
    use rodyn_integrator, only: integrator_type, solver_options
    use rodyn_integrators, only: new_integrator
@@ -20,6 +22,8 @@ module test_trajectories
       type(run_row), allocatable :: rows(:)
       integer :: n_rows = 0
       real(wp) :: initial_energy = 0.0_wp
+      type(hinge_event), allocatable :: events(:)
+      integer :: n_events = 0
    contains
       procedure :: observe
    end type trajectory
@@ -27,11 +31,12 @@ module test_trajectories
 contains
 
    !> Integrate a case by its method ('auto' is dop853 here) and keep the states at `times`.
-   subroutine integrate(config, times, result, error)
+   subroutine integrate(config, times, result, error, load)
       type(case_config), intent(in) :: config
       real(wp), intent(in) :: times(:)          !! increasing; the last one is the end [s]
       type(trajectory), intent(out) :: result
       type(error_type), allocatable, intent(out) :: error
+      class(user_load), target, intent(inout), optional :: load !! forces beside those of the case
       type(scene_type) :: scene
       type(motion_type), target :: motion
       class(integrator_type), allocatable :: integrator
@@ -44,6 +49,7 @@ contains
       call new_scene(scene, config, error)
       if (.not. allocated(error)) call new_motion(motion, scene, config%output%ledger, error)
       if (allocated(error)) return
+      if (present(load)) call motion%set_user_load(load)
       call initial_state(motion, config%initial, y)
       options%rtol = config%solver%rtol
       options%atol = config%solver%atol
@@ -57,7 +63,10 @@ contains
       do i = 1, size(times)
          result%rows(i) = new_run_row(scene%n)
       end do
+      motion%events%most = config%solver%max_events
       call simulate(motion, integrator, times, times(size(times)), result, y, t, error)
+      result%n_events = motion%events%n_logged
+      result%events = motion%events%log
       call integrator%finalize()
    end subroutine integrate
 
