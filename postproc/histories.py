@@ -15,8 +15,9 @@ import command
 import style
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from rodyn_data import Quantity, Run, open_run
+from rodyn_data import Event, Quantity, Run, open_run
 
+MOST_MARKS = 200  # events shown
 SPACECRAFT = [
     ("velocity, moving axes", ["velocity_x", "velocity_y"]),
     ("angular velocity", ["omega"]),
@@ -52,9 +53,19 @@ def draw(run: Run, panels: Sequence[tuple[str, Sequence[Quantity]]], title: str)
     figure.suptitle(f"{title}: " + style.shorten(run.title, 64) + style.status_suffix(run.status, time[-1]))
     for axes, (title, quantities) in zip(grid.flat, panels, strict=False):
         draw_panel(axes, time, title, quantities)
+    mark_events(grid.flat[:len(panels)], run.events())
     for axes in grid.flat[len(panels):]:
         axes.set_visible(False)
     return figure
+
+
+def mark_events(panels: Sequence[Axes], events: Sequence[Event]) -> None:
+    """A thin line at each event, as long as they can be told apart."""
+    if len(events) > MOST_MARKS:
+        return
+    for axes in panels:
+        for time in dict.fromkeys(event.time for event in events):
+            axes.axvline(time, color="0.6", linewidth=0.6, linestyle=":", zorder=0)
 
 
 def draw_panel(axes: Axes, time, title: str, quantities: Sequence[Quantity]) -> None:

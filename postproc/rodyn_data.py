@@ -37,6 +37,15 @@ class Quantity(NamedTuple):
         return f"{self.symbol} [{self.unit}]" if self.unit else self.symbol
 
 
+class Event(NamedTuple):
+    """Something that a hinge did."""
+
+    time: float
+    hinge: int
+    kind: str  # released, latched, at_upper_stop, slides, ...
+    energy_lost: float  # J
+
+
 TIME = "time"
 ROD_SYMBOLS = {
     "phi": r"\varphi", "alpha": r"\alpha", "beta": r"\beta",
@@ -167,6 +176,14 @@ class Run:
 
     def attributes(self) -> dict[str, Any]:
         return {name: text_of(value) for name, value in self.file.attrs.items()}
+
+    def events(self) -> list[Event]:
+        """What hinges did, in order; empty if nothing could happen."""
+        if "events" not in self.file:
+            return []
+        group = self.file["events"]
+        columns = (group["time"][()], group["hinge"][()], group["kind"].asstr()[()], group["energy_lost"][()])
+        return [Event(float(t), int(hinge), str(kind), float(lost)) for t, hinge, kind, lost in zip(*columns, strict=True)]
 
     def solver(self) -> dict[str, Any]:
         """What the solver did; empty if the file does not say."""
