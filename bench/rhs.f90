@@ -7,7 +7,7 @@ program bench_rhs
    use, intrinsic :: iso_fortran_env, only: compiler_options
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type
-   use rodyn_case_config, only: case_config, load_config
+   use rodyn_case_config, only: case_config, hinge_config, kink_config, load_config
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_motion, only: motion_type, new_motion, initial_state
    implicit none (type, external)
@@ -27,7 +27,7 @@ program bench_rhs
    type(case_config) :: config
    integer :: i, round
 
-   allocate (subjects(25))
+   allocate (subjects(30))
    i = 0
    call add('n = 4, consistent, recursive', standard(4))
    config = standard(4)
@@ -65,6 +65,19 @@ program bench_rhs
    call add('n = 4, hinge 2 locked', standard(4), locked=[3])
    call add('n = 4, rigid rods, hinge 2 locked', rigid(4), locked=[3])
    call add('n = 1024, every other hinge locked', standard(1024), locked=[(round, round=1, 1024, 2)])
+   config = standard(4)
+   config%kink_programs = [kink_config(hinge=2, law='sine', value=0.1_wp, rate=2.0_wp, t_end=1.0_wp)]
+   call add('n = 4, one kink driven', config)
+   call add('n = 4, one kink driven, with ledger', config, ledger=.true.)
+   deallocate (config%kink_programs)
+   config%hinges = [hinge_config(hinge=1, freeplay=1.0e-3_wp), &
+                    hinge_config(hinge=2, lower_stop=-1.0_wp, upper_stop=1.0_wp, stop_stiffness=1.0e4_wp), &
+                    hinge_config(hinge=3, friction_moment=1.0_wp, friction_velocity=0.01_wp)]
+   call add('n = 4, freeplay, stops, friction', config)
+   call add('n = 4, the same, with ledger', config, ledger=.true.)
+   config = standard(4)
+   config%hinges = [hinge_config(hinge=2, held=.true.)]
+   call add('n = 4, hinge 2 held by &hinge', config)
    do round = 1, size(chain_sizes)
       call add('', standard(chain_sizes(round)))
       write (subjects(i)%name, '("chain of ", i0)') chain_sizes(round)
@@ -139,8 +152,9 @@ contains
       if (allocated(error)) error stop error%message
       call new_motion(subjects(i)%motion, scene, with_ledger, error)
       if (allocated(error)) error stop error%message
-      call subjects(i)%motion%dynamics%set_regime(0.0_wp, 1.0_wp)
       call initial_state(subjects(i)%motion, c%initial, subjects(i)%y)
+      call subjects(i)%motion%begin_regime(0.0_wp, 1.0_wp, 1.0_wp, subjects(i)%y, error)
+      if (allocated(error)) error stop error%message
       if (present(locked)) then
          locks = .false.
          locks(locked) = .true.
