@@ -20,15 +20,15 @@ module rodyn_hinge_mechanism
    private
    public :: hinge_mechanism, new_mechanism
    public :: part_spring, part_lower, part_upper, part_friction, part_latch, n_parts
-   public :: kind_names, kind_released, kind_latched, kind_kink_step
+   public :: kind_names, kind_released, kind_latched
 
    !> Parts of a mechanism that have a margin.
    integer, parameter :: part_spring = 1, part_lower = 2, part_upper = 3, part_friction = 4, part_latch = 5, n_parts = 5
 
    !> Kinds of events.
-   integer, parameter :: kind_released = 1, kind_latched = 2, kind_kink_step = 3, kind_in_freeplay = 4, kind_out_of_freeplay = 5, &
-      kind_at_lower = 6, kind_off_lower = 7, kind_at_upper = 8, kind_off_upper = 9, kind_slides = 10, kind_sticks = 11
-   character(len=*), parameter :: kind_names(11) = [character(len=16) :: 'released', 'latched', 'kink_step', 'in_freeplay', &
+   integer, parameter :: kind_released = 1, kind_latched = 2, kind_in_freeplay = 3, kind_out_of_freeplay = 4, &
+      kind_at_lower = 5, kind_off_lower = 6, kind_at_upper = 7, kind_off_upper = 8, kind_slides = 9, kind_sticks = 10
+   character(len=*), parameter :: kind_names(10) = [character(len=16) :: 'released', 'latched', 'in_freeplay', &
       'out_of_freeplay', 'at_lower_stop', 'off_lower_stop', 'at_upper_stop', 'off_upper_stop', 'slides', 'sticks']
 
    real(wp), parameter :: hysteresis = 1.0e-12_wp !! [rad], [rad/s]
