@@ -76,6 +76,7 @@ program bench_rhs
    call add('n = 4, freeplay, stops, friction', config)
    call add('n = 4, the same, with ledger', config, ledger=.true.)
    config = standard(4)
+   config%initial%phi_rate = 0.0_wp ! what is held must not turn
    config%hinges = [hinge_config(hinge=2, held=.true.)]
    call add('n = 4, hinge 2 held by &hinge', config)
    do round = 1, size(chain_sizes)
