@@ -8,7 +8,7 @@
 !> methods are tried on the beginning of the run.
 module rodyn_method_choice
    use rodyn_kinds, only: wp
-   use rodyn_case_config, only: solver_config
+   use rodyn_case_config, only: none_given, solver_config
    use rodyn_scene, only: scene_type
    use rodyn_fastest_rates, only: fastest_rates, with_rigid_rods
    use rodyn_integrator, only: solver_options, time_text
@@ -62,6 +62,8 @@ contains
       call fastest_rates(scene, y(:scene%n_q), choice%frequency, choice%decay)
       explicit = stages*t_end*max(choice%frequency/vibration_limit, choice%decay/stability_limit)
       choice%steps = explicit/stages
+      ! Latching excites all vibrations of the rods, which a trial on the beginning of the run does not see.
+      if (scene%dynamic_bending .and. any(scene%hinges%mechanisms%latch < none_given)) return
       slow = 0.0_wp
       if (explicit >= long_run) &
          call fastest_rates(with_rigid_rods(scene), y(:scene%n_base + scene%n + scene%n_q - scene%n_dof), slow)
