@@ -27,7 +27,7 @@ module rodyn_accelerations
       type(scene_type) :: scene
       type(workspace_type) :: work
       type(assembled_system) :: system !! for the assembled kernel only
-      type(joint_recursion), allocatable :: joints !! for locked hinges; allocated when first needed
+      type(joint_recursion), allocatable :: joints !! for locked hinges and the bubble; allocated when first needed
       real(wp), allocatable :: opening_acceleration(:) !! of locked hinges, given (0:n-1) [rad/s^2]
       integer :: n_locks = 0           !! how often hinges were locked or freed: what was derived from the scene is then stale
       type(load_regime) :: regime      !! loads between the last switch and the next
@@ -75,7 +75,7 @@ contains
          self%path = path_assembled
          self%needs_moments = size(self%scene%hinges%relaxing) > 0 .or. self%scene%hinges%has_locks
          call new_assembled_system(self%system, self%scene, error)
-      else if (has_slaves(self%scene)) then
+      else if (has_slaves(self%scene) .or. self%scene%n_bend == 3) then
          self%path = path_joints
          if (.not. allocated(self%joints)) allocate (self%joints)
          call new_joint_recursion(self%joints, self%scene)
@@ -251,7 +251,7 @@ contains
       ok = all(lane_ok)
    end subroutine lane_accelerations
 
-   !> Lane after lane, for the assembled kernel and for locked hinges.
+   !> Lane after lane, for the assembled kernel, locked hinges and the bubble.
    subroutine one_by_one(self, t, q, p, acceleration, ok)
       class(dynamics_type), intent(inout) :: self
       real(wp), intent(in) :: t(lanes)

@@ -1,5 +1,5 @@
 !> Inertia and stiffness of one rod as matrices over its bending coordinates, whatever their number: none (rigid or
-!> massless rods) or the slopes alpha, beta. For code that is written once for all of them.
+!> massless rods), the slopes alpha, beta, or these and the bubble. For code that is written once for all of them.
 module rodyn_rod_bending
    use rodyn_kinds, only: wp
    use rodyn_rod_constants, only: rod_constants
@@ -7,9 +7,10 @@ module rodyn_rod_bending
    private
    public :: rod_bending, new_rod_bending, most_shapes
 
-   integer, parameter :: most_shapes = 2 !! bending coordinates of a rod at most
+   integer, parameter :: most_shapes = 3 !! bending coordinates of a rod at most
 
-   !> With x the bending coordinates, N their shapes and m(s) the mass per length.
+   !> With x the bending coordinates, N their shapes and m(s) the mass per length. Rows beyond the rod's coordinates are zero.
+   !> Units are those of alpha, beta [rad]; the bubble is a length and has 1/m less.
    type :: rod_bending
       integer :: n = 0                                   !! bending coordinates
       real(wp) :: first(most_shapes) = 0.0_wp            !! int m N [kg m]
@@ -22,28 +23,40 @@ module rodyn_rod_bending
 contains
 
    !> Matrices of a rod.
-   pure function new_rod_bending(rod, n) result(bending)
+   pure function new_rod_bending(rod, n, consistent) result(bending)
       type(rod_constants), intent(in) :: rod
-      integer, intent(in) :: n !! bending coordinates
+      integer, intent(in) :: n          !! bending coordinates: 0, 2 or 3
+      logical, intent(in) :: consistent !! keep second-order inertia
       type(rod_bending) :: bending
 
       bending%n = n
       if (n == 0) return
-      associate (i => rod%inertia)
-         bending%first = [i%a1, i%b1]
-         bending%turning = [i%sa, i%sb]
-         bending%inertia = symmetric([i%aa, i%ab, i%bb])
-         bending%second = symmetric(rod%second)
-         bending%stiffness = symmetric([2.0_wp*rod%kappa, rod%kappa, 2.0_wp*rod%kappa])
+      associate (i => rod%inertia, kappa => rod%kappa)
+         bending%first = [i%a1, i%b1, i%c1]
+         bending%turning = [i%sa, i%sb, i%sc]
+         bending%first(n + 1:) = 0.0_wp
+         bending%turning(n + 1:) = 0.0_wp
+         call fill(bending%inertia, n, [i%aa, i%ab, i%bb, i%ac, i%bc, i%cc])
+         if (consistent) bending%second = bending%inertia
+         call fill(bending%stiffness, n, [2.0_wp*kappa, kappa, 2.0_wp*kappa, rod%bubble])
       end associate
    end function new_rod_bending
 
-   !> From (1,1), (1,2), (2,2).
-   pure function symmetric(elements) result(matrix)
-      real(wp), intent(in) :: elements(3)
-      real(wp) :: matrix(2, 2)
-      matrix(:, 1) = elements(1:2)
-      matrix(:, 2) = elements(2:3)
-   end function symmetric
+   !> The first n rows and columns of a symmetric matrix, from (1,1), (1,2), (2,2), (1,3), (2,3), (3,3).
+   pure subroutine fill(matrix, n, elements)
+      real(wp), intent(inout) :: matrix(:, :)
+      integer, intent(in) :: n
+      real(wp), intent(in) :: elements(6)
+      integer :: i, j, at
+
+      at = 0
+      do j = 1, n
+         do i = 1, j
+            at = at + 1
+            matrix(i, j) = elements(at)
+            matrix(j, i) = elements(at)
+         end do
+      end do
+   end subroutine fill
 
 end module rodyn_rod_bending
