@@ -3,7 +3,8 @@
 !> Written independently of the recursion, as the second route to the same accelerations. For the columns of N,
 !>     z = (w Vx, w Vy, w^2, phi_m'(2 w + phi_m'), (w + phi_m') alpha_m', (w + phi_m') beta_m'),  m = 1..n;
 !> the article joins the last two for uniform rods, where int m Na = -int m Nb. On a fixed spacecraft the first
-!> three rows and columns are absent. Bubbles follow beta and are treated like alpha and beta. For massless rods all rod integrals are zero. Locked hinges: `rodyn_locks`.
+!> three rows and columns are absent. Bubbles stand behind beta and are treated like alpha and beta. For massless rods
+!> all rod integrals are zero. Locked hinges: `rodyn_locks`.
 module rodyn_assembled
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp
