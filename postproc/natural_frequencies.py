@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from rodyn_data import Run
 
-# Gauss points and weights on 0..1, exact to degree 7: mass integrals of cubics have degree 6.
+# Gauss points and weights on 0..1, exact to degree 9: mass integrals of cubics have degree 6, of bubbles 8.
 _X, _W = np.polynomial.legendre.leggauss(5)
 GAUSS_X, GAUSS_W = 0.5 * (_X + 1.0), 0.5 * _W
 
