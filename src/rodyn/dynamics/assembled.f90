@@ -276,15 +276,17 @@ contains
       real(wp), intent(in) :: sine(0:), cosine(0:) !! of phi (0:n)
       real(wp), intent(in) :: q(:)                 !! coordinates (dof)
       integer :: i, j, k, fj, fk
-      real(wp) :: mvv, normal(2), along
+      real(wp) :: mvv, normal(2), along, x(most_shapes), curved(most_shapes)
 
       associate (m => system%m, n => scene%n)
          m = 0.0_wp
          call first_moments(system, scene, sine, cosine, q)
          do k = 1, n
             fk = scene%phi_at() + k
-            associate (rod => scene%rods(scene%rod_of(k)), bend => scene%bending(scene%rod_of(k)), x => scene%bends(k, q))
-               mvv = dot_product(x, matmul(bend%second, x))
+            x = scene%bends(k, q)
+            associate (rod => scene%rods(scene%rod_of(k)), bend => scene%bending(scene%rod_of(k)))
+               curved = matmul(bend%second, x)
+               mvv = dot_product(x, curved)
                do i = 1, scene%n_bend
                   do j = 1, i
                      call set_pair(m, scene%bend_at(i) + k, scene%bend_at(j) + k, bend%inertia(i, j))
@@ -322,14 +324,15 @@ contains
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: sine(0:), cosine(0:)
       real(wp), intent(in) :: q(:)
-      real(wp) :: arm, mv
+      real(wp) :: arm, mv, x(most_shapes)
       integer :: k
 
       system%outboard(scene%n) = scene%node_mass(scene%n)
       do k = scene%n, 1, -1
          associate (rod => scene%rods(scene%rod_of(k)), i => scene%rods(scene%rod_of(k))%inertia)
             arm = i%m1 + rod%length*system%outboard(k)
-            mv = dot_product(scene%bending(scene%rod_of(k))%first, scene%bends(k, q))
+            x = scene%bends(k, q)
+            mv = dot_product(scene%bending(scene%rod_of(k))%first, x)
             system%static(:, k) = [-arm*sine(k) - mv*cosine(k), arm*cosine(k) - mv*sine(k)]
             system%axial(:, k) = [system%static(2, k), -system%static(1, k)]
             system%outboard(k - 1) = system%outboard(k) + i%m0 + scene%node_mass(k - 1)
@@ -410,7 +413,7 @@ contains
       real(wp), intent(in) :: sine(0:), cosine(0:)
       real(wp), intent(in) :: q(:)
       integer, intent(in) :: i
-      real(wp) :: inward(2), across, pull(most_shapes)
+      real(wp) :: inward(2), across, x(most_shapes), pull(most_shapes)
       integer :: j, k, column
 
       column = scene%phi_at() + i
@@ -428,7 +431,8 @@ contains
                nm(scene%bend_at(j) + k, column) = scene%bending(scene%rod_of(k))%first(j)*across
             end do
          end do
-         pull = matmul(scene%bending(scene%rod_of(i))%inertia, scene%bends(i, q))
+         x = scene%bends(i, q)
+         pull = matmul(scene%bending(scene%rod_of(i))%inertia, x)
          do j = 1, scene%n_bend
             nm(scene%bend_at(j) + i, column) = -pull(j)
          end do
@@ -444,14 +448,15 @@ contains
       real(wp), intent(in) :: sine(0:), cosine(0:)
       real(wp), intent(in) :: q(:)
       integer, intent(in) :: i
-      real(wp) :: force(2), turn(most_shapes)
+      real(wp) :: force(2), x(most_shapes), turn(most_shapes)
       integer :: j, k, column
 
-      turn = 2.0_wp*matmul(scene%bending(scene%rod_of(i))%second, scene%bends(i, q))
+      x = scene%bends(i, q)
+      turn = matmul(scene%bending(scene%rod_of(i))%second, x)
       do j = 1, scene%n_bend
          column = scene%bend_at(j) + i
          force = -2.0_wp*scene%bending(scene%rod_of(i))%first(j)*[cosine(i), sine(i)]
-         system%n(scene%phi_at() + i, column) = turn(j)
+         system%n(scene%phi_at() + i, column) = 2.0_wp*turn(j)
          do k = 1, i - 1
             associate (length => scene%rods(scene%rod_of(k))%length)
                system%n(scene%phi_at() + k, column) = length*dot_product([-sine(k), cosine(k)], force)
