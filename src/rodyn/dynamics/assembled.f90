@@ -10,7 +10,7 @@ module rodyn_assembled
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type, raise
    use rodyn_scene, only: scene_type
-   use rodyn_rod_bending, only: most_shapes
+   use rodyn_bending_matrices, only: most_shapes
    use rodyn_locks, only: has_slaves, reduce, expand, reduce_matrix, reactions
    use rodyn_lapack, only: dpotrf, dpotrs, dgesv, dgemv
    implicit none (type, external)

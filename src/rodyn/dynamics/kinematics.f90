@@ -2,7 +2,7 @@
 module rodyn_kinematics
    use rodyn_kinds, only: wp
    use rodyn_scene, only: scene_type
-   use rodyn_rod_bending, only: most_shapes
+   use rodyn_bending_matrices, only: most_shapes
    use rodyn_hinge_law, only: hinge_state, hinge_rates, openings
    use rodyn_three_moments, only: slopes_from_moments
    implicit none (type, external)

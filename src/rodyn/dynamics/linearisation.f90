@@ -7,7 +7,7 @@
 module rodyn_linearisation
    use rodyn_kinds, only: wp
    use rodyn_scene, only: scene_type
-   use rodyn_rod_bending, only: most_shapes
+   use rodyn_bending_matrices, only: most_shapes
    use rodyn_hinge_law, only: hinge_tangent
    implicit none (type, external)
    private

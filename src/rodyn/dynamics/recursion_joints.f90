@@ -19,7 +19,7 @@ module rodyn_recursion_joints
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp
    use rodyn_scene, only: scene_type
-   use rodyn_rod_bending, only: rod_bending, most_shapes
+   use rodyn_bending_matrices, only: bending_matrices, most_shapes
    implicit none (type, external)
    private
    public :: joint_recursion, new_joint_recursion, joint_accelerations
@@ -110,7 +110,7 @@ contains
    !> end tangent by W' + beta''. Formed in (A, W', x) and brought to tau = W' + alpha''.
    pure subroutine rod_equations(scene, bending, k, q, p, elastic, inertia, bias, pass, h, c)
       type(scene_type), intent(in) :: scene
-      type(rod_bending), intent(in) :: bending
+      type(bending_matrices), intent(in) :: bending
       integer, intent(in) :: k
       real(wp), intent(in) :: q(:), p(:)
       logical, intent(in) :: elastic

@@ -11,7 +11,7 @@ module rodyn_scene
    use rodyn_case_config, only: case_config
    use rodyn_quadrature, only: gauss_rule, new_gauss_rule
    use rodyn_rod_constants, only: rod_constants, new_rod_constants
-   use rodyn_rod_bending, only: rod_bending, new_rod_bending, most_shapes
+   use rodyn_bending_matrices, only: bending_matrices, new_bending_matrices, most_shapes
    use rodyn_spacecraft, only: spacecraft_body
    use rodyn_hinge_law, only: hinge_law, new_hinge_law
    use rodyn_loads, only: load_set, new_load_set
@@ -34,7 +34,7 @@ module rodyn_scene
       type(spacecraft_body) :: body
       real(wp), allocatable :: node_mass(:)    !! (0:n) [kg]; node 0 and the halves of rods only when lumped
       type(rod_constants), allocatable :: rods(:) !! the distinct rods
-      type(rod_bending), allocatable :: bending(:) !! their matrices over the bending coordinates
+      type(bending_matrices), allocatable :: bending(:) !! their matrices over the bending coordinates
       integer, allocatable :: rod_of(:)        !! which of them is rod k (1:n)
       type(hinge_law) :: hinges
       type(load_set) :: loads
@@ -174,7 +174,7 @@ contains
                           'mass_per_length > 0 and gauss_points >= 2', exit_bad_input)
                return
             end if
-            scene%bending(j) = new_rod_bending(rods(j), scene%n_bend, scene%consistent)
+            scene%bending(j) = new_bending_matrices(rods(j), scene%n_bend, scene%consistent)
          end associate
       end do
       call move_alloc(rods, scene%rods)
