@@ -1,4 +1,4 @@
-"""Where spacecraft, nodes and points of the rods are: nodes joined by chords, cubic deflections on them."""
+"""Where spacecraft, nodes and points of the rods are: nodes joined by chords, cubic (or quartic) deflections on them."""
 
 from __future__ import annotations
 
@@ -24,13 +24,14 @@ def shapes(run: Run, rows: np.ndarray, magnification: float = 1.0, frame: str = 
     """Shapes at rows of the run (rising)."""
     names = ["phi", "alpha", "beta", "displacement_x", "displacement_y", "rotation"]
     state = {name: run.rows(name, rows) for name in names}
+    bubble = bubbles(run, rows)
     time = run.rows("time", rows)
     hinge = np.array([run.number("spacecraft", "hinge_x", 0.0), run.number("spacecraft", "hinge_y", 0.0)])
     length = run.per_rod("length")
     outline = body_outline(run)
     result = []
     for i, t in enumerate(time):
-        nodes, rods = chain(hinge, length, state["phi"][i], state["alpha"][i], state["beta"][i], magnification)
+        nodes, rods = chain(hinge, length, state["phi"][i], state["alpha"][i], state["beta"][i], magnification, bubble[i])
         shape = Shape(float(t), np.zeros(2), outline, nodes, rods)
         if frame == "inertial":
             displacement = np.array([state["displacement_x"][i], state["displacement_y"][i]])
@@ -40,26 +41,32 @@ def shapes(run: Run, rows: np.ndarray, magnification: float = 1.0, frame: str = 
 
 
 def chain(hinge: np.ndarray, length: np.ndarray, phi: np.ndarray, alpha: np.ndarray, beta: np.ndarray,
-          magnification: float) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes r_k = r_{k-1} + l e_k, and points r_{k-1} + s e_k + v n_k with v = Na alpha + Nb beta."""
+          magnification: float, bubble: np.ndarray | float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes r_k = r_{k-1} + l e_k, and points r_{k-1} + s e_k + v n_k with v = Na alpha + Nb beta + Nc bubble."""
     along = np.stack([np.cos(phi), np.sin(phi)], axis=-1)
     across = np.stack([-along[:, 1], along[:, 0]], axis=-1)
     nodes = np.concatenate([hinge[None], hinge + np.cumsum(length[:, None] * along, axis=0)])
     x = np.linspace(0.0, 1.0, POINTS)
-    v = magnification * deflection(length, alpha, beta, x)
+    v = magnification * deflection(length, alpha, beta, x, bubble)
     rods = nodes[:-1, None] + (length[:, None] * x)[..., None] * along[:, None] + v[..., None] * across[:, None]
     return nodes, rods
 
 
-def deflection(length: np.ndarray, alpha: np.ndarray, beta: np.ndarray, x: np.ndarray) -> np.ndarray:
+def deflection(length: np.ndarray, alpha: np.ndarray, beta: np.ndarray, x: np.ndarray,
+               bubble: np.ndarray | float = 0.0) -> np.ndarray:
     """v at s = x l of each rod, (..., n, points)."""
-    na, nb = x * (1 - x) ** 2, -(x**2) * (1 - x)
-    return length[..., None] * (na * alpha[..., None] + nb * beta[..., None])
+    na, nb, nc = x * (1 - x) ** 2, -(x**2) * (1 - x), 16 * (x * (1 - x)) ** 2
+    return length[..., None] * (na * alpha[..., None] + nb * beta[..., None]) + nc * np.asarray(bubble)[..., None]
+
+
+def bubbles(run: Run, rows: np.ndarray | int) -> np.ndarray:
+    """Deflections by the third bending shape, zero in a run without."""
+    return run.rows("bubble", rows) if "bubble" in run.file else np.zeros_like(run.rows("phi", rows))
 
 
 def largest_deflection(run: Run, row: int) -> float:
     """Of all rods, at the points of the curves [m]."""
-    v = deflection(run.per_rod("length"), run.rows("alpha", row), run.rows("beta", row), np.linspace(0, 1, 201))
+    v = deflection(run.per_rod("length"), run.rows("alpha", row), run.rows("beta", row), np.linspace(0, 1, 201), bubbles(run, row))
     return float(np.max(np.abs(v)))
 
 

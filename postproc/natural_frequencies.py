@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 from rodyn_data import Run
 
-# Gauss points and weights on 0..1, exact to degree 7: mass integrals of cubics have degree 6.
-_X, _W = np.polynomial.legendre.leggauss(4)
+# Gauss points and weights on 0..1, exact to degree 9: mass integrals of cubics have degree 6, of bubbles 8.
+_X, _W = np.polynomial.legendre.leggauss(5)
 GAUSS_X, GAUSS_W = 0.5 * (_X + 1.0), 0.5 * _W
 
 
@@ -24,14 +24,15 @@ def natural_frequencies(run: Run) -> np.ndarray:
 
 
 def matrices(run: Run) -> tuple[np.ndarray, np.ndarray]:
-    """M and K; unknowns (u_x, u_y, theta) of a free spacecraft, phi, and alpha, beta of dynamic bending."""
+    """M and K; unknowns (u_x, u_y, theta) of a free spacecraft, phi, and alpha, beta (and bubbles) of dynamic bending."""
     n = run.n_rods
     model, initial = run.group("model"), run.group("initial")
     dynamic = model.get("bending", "dynamic") == "dynamic"
     lumped = model.get("inertia") == "lumped"
     base = 0 if run.group("spacecraft").get("motion") == "fixed" else 3
-    at = {"phi": base, "alpha": base + n, "beta": base + 2 * n}
-    size = base + n * (3 if dynamic else 1)
+    shapes = int(model.get("bending_shapes", 2))
+    at = {"phi": base, "alpha": base + n, "beta": base + 2 * n, "bubble": base + 3 * n}
+    size = base + n * (1 + shapes if dynamic else 1)
 
     length, density = run.per_rod("length"), run.per_rod("mass_per_length")
     phi = np.zeros(n) + np.asarray(initial.get("phi", 0.0), dtype=float)
@@ -60,6 +61,8 @@ def matrices(run: Run) -> tuple[np.ndarray, np.ndarray]:
                 if dynamic:
                     point[:, at["alpha"] + k] = length[k] * x * (1 - x) ** 2 * across
                     point[:, at["beta"] + k] = -length[k] * x**2 * (1 - x) * across
+                if dynamic and shapes == 3:
+                    point[:, at["bubble"] + k] = 16 * (x * (1 - x)) ** 2 * across
                 mass += weight * density[k] * length[k] * point.T @ point
         move = move + length[k] * turn
         mass += node_mass[k + 1] * move.T @ move
@@ -92,4 +95,6 @@ def _stiffness(run: Run, at: dict[str, int], size: int, dynamic: bool) -> np.nda
         for k in range(n):
             pair = [at["alpha"] + k, at["beta"] + k]
             stiffness[np.ix_(pair, pair)] += bending[k] * np.array([[2.0, 1.0], [1.0, 2.0]])
+            if size > at["bubble"]:  # int EI Nc''^2 = 204.8 EI / l^3, and nothing with Na, Nb
+                stiffness[at["bubble"] + k, at["bubble"] + k] += 102.4 * bending[k] / run.per_rod("length")[k] ** 2
     return 0.5 * (stiffness + stiffness.T)

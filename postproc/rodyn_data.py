@@ -50,6 +50,7 @@ TIME = "time"
 ROD_SYMBOLS = {
     "phi": r"\varphi", "alpha": r"\alpha", "beta": r"\beta",
     "phi_rate": r"\dot{\varphi}", "alpha_rate": r"\dot{\alpha}", "beta_rate": r"\dot{\beta}",
+    "bubble": "c", "bubble_rate": r"\dot{c}",  # with three bending shapes
 }
 SPACECRAFT_SYMBOLS = {
     "velocity_x": "V_x", "velocity_y": "V_y", "omega": r"\omega",
@@ -63,11 +64,12 @@ SYMBOLS = ROD_SYMBOLS | SPACECRAFT_SYMBOLS | LEDGER_SYMBOLS
 UNITS = (
     dict.fromkeys(["phi", "alpha", "beta", "rotation"], "rad")
     | dict.fromkeys(["phi_rate", "alpha_rate", "beta_rate", "omega"], "rad s-1")
-    | dict.fromkeys(["velocity_x", "velocity_y"], "m s-1")
-    | dict.fromkeys(["displacement_x", "displacement_y"], "m")
+    | dict.fromkeys(["velocity_x", "velocity_y", "bubble_rate"], "m s-1")
+    | dict.fromkeys(["displacement_x", "displacement_y", "bubble"], "m")
 )
 MEANINGS = {
     "phi": "chord angle", "alpha": "slope at the inner end", "beta": "slope at the outer end",
+    "bubble": "deflection by the third shape", "bubble_rate": "rate of the deflection by the third shape",
     "phi_rate": "rate of the chord angle", "alpha_rate": "rate of the inner slope", "beta_rate": "rate of the outer slope",
     "velocity_x": "velocity along the moving x axis", "velocity_y": "velocity along the moving y axis",
     "omega": "angular velocity", "displacement_x": "displacement along the moving x axis",
@@ -78,7 +80,7 @@ MEANINGS = {
     "angular_momentum": "angular momentum",
 }
 RATE_OF = {
-    "phi": "phi_rate", "alpha": "alpha_rate", "beta": "beta_rate",
+    "phi": "phi_rate", "alpha": "alpha_rate", "beta": "beta_rate", "bubble": "bubble_rate",
     "displacement_x": "velocity_x", "displacement_y": "velocity_y", "rotation": "omega",
 }
 FINAL = "final_"  # states at the end of each case of a sweep

@@ -16,6 +16,8 @@ contains
          new_test('lumped inertia with the default bending is refused', default_lumped), &
          new_test('quasistatic bending with distributed inertia is refused', quasistatic_distributed), &
          new_test('bent rods at the start are refused unless bending is dynamic', bent_rigid), &
+         new_test('a third bending shape needs dynamic bending and five Gauss points', third_shape), &
+         new_test('bubbles at the start are refused with two shapes', bubbles_refused), &
          new_test('a fixed spacecraft does not move at the start', fixed_moves), &
          new_test('a load on a node needs the node', node_missing), &
          new_test('a load on a node that does not exist is refused', node_unknown), &
@@ -105,6 +107,26 @@ contains
          'c.nml:4: &initial alpha_rate = 1: must be 0 when bending = ''rigid'''//nl//&
          'c.nml:4: &initial beta_rate = 4*1: must be 0 when bending = ''rigid''')
    end subroutine bent_rigid
+
+   subroutine third_shape(error)
+      type(error_type), allocatable, intent(out) :: error
+      call expect_faults(error, &
+         valid//'&model bending_shapes = 3 /', &
+         'c.nml:3: &model bending_shapes = 3: 3 needs gauss_points = 5 or more (the square of the third shape has degree 8)')
+      if (allocated(error)) return
+      call expect_faults(error, &
+         valid//'&model bending_shapes = 3, gauss_points = 5, bending = ''rigid'' /', &
+         'c.nml:3: &model bending_shapes = 3: 3 is possible with bending = ''dynamic'' only')
+      if (allocated(error)) return
+      call expect_faults(error, valid//'&model bending_shapes = 4 /', 'c.nml:3: &model bending_shapes = 4: must lie in 2..3')
+   end subroutine third_shape
+
+   subroutine bubbles_refused(error)
+      type(error_type), allocatable, intent(out) :: error
+      call expect_faults(error, valid//'&initial bubble(2) = 0.01, bubble_rate = 1 /', &
+         'c.nml:3: &initial bubble(2) = 0.01: must be 0 when bending_shapes = 2'//nl//&
+         'c.nml:3: &initial bubble_rate = 1: must be 0 when bending_shapes = 2')
+   end subroutine bubbles_refused
 
    subroutine fixed_moves(error)
       type(error_type), allocatable, intent(out) :: error

@@ -6,7 +6,8 @@ module test_random_scenes
    private
    public :: random_case, seed_random, uniform, kind_name, n_kinds, allocate_case
 
-   integer, parameter :: n_kinds = 14 !! 7 models on a free and on a fixed spacecraft
+   integer, parameter :: n_kinds = 18 !! 7 models on a free and on a fixed spacecraft, and 4 with a third bending shape
+   integer, parameter :: with_two_shapes = 14
 
 contains
 
@@ -36,14 +37,22 @@ contains
       call set_kind(config, which)
       name = trim(config%model%formulation)//' '//trim(config%model%inertia)//' '// &
              trim(config%model%bending)//' '//trim(config%model%dampers)//' '//trim(config%spacecraft%motion)
+      if (config%model%bending_shapes == 3) name = name//' with bubbles'
    end function kind_name
 
    !> Choose the model: 1..n_kinds.
    subroutine set_kind(config, which)
       type(case_config), intent(inout) :: config
       integer, intent(in) :: which
-      config%spacecraft%motion = merge('free ', 'fixed', which <= n_kinds/2)
-      select case (mod(which - 1, n_kinds/2))
+      if (which > with_two_shapes) then
+         config%spacecraft%motion = merge('free ', 'fixed', which <= with_two_shapes + 2)
+         config%model%formulation = merge('consistent', 'paper     ', mod(which, 2) == 1)
+         config%model%bending_shapes = 3
+         config%model%gauss_points = 5
+         return
+      end if
+      config%spacecraft%motion = merge('free ', 'fixed', which <= with_two_shapes/2)
+      select case (mod(which - 1, with_two_shapes/2))
       case (0)
          config%model%formulation = 'consistent'
       case (1)
@@ -74,7 +83,8 @@ contains
       allocate (config%chain%length(n), config%chain%mass_per_length(n), config%chain%bending_stiffness(n), &
                 config%chain%node_mass(n), config%chain%hinge_stiffness(0:n - 1), config%chain%hinge_damping(0:n - 1), &
                 config%chain%kink(0:n - 1), config%initial%phi(n), config%initial%alpha(n), config%initial%beta(n), &
-                config%initial%phi_rate(n), config%initial%alpha_rate(n), config%initial%beta_rate(n), source=0.0_wp)
+                config%initial%phi_rate(n), config%initial%alpha_rate(n), config%initial%beta_rate(n), &
+                config%initial%bubble(n), config%initial%bubble_rate(n), source=0.0_wp)
       allocate (config%loads(0))
       config%title = ''
    end subroutine allocate_case
@@ -108,16 +118,22 @@ contains
    subroutine random_initial(config, n)
       type(case_config), intent(inout) :: config
       integer, intent(in) :: n
+      real(wp) :: slope
       integer :: k
 
+      slope = 0.1_wp
+      if (config%model%bending_shapes == 3) slope = 0.01_wp ! the mass matrix of `paper` bears less with three shapes
       do k = 1, n
          config%initial%phi(k) = uniform(-4.0_wp, 4.0_wp)
          config%initial%phi_rate(k) = uniform(-5.0_wp, 5.0_wp)
          if (config%model%bending /= 'dynamic') cycle
-         config%initial%alpha(k) = uniform(-0.1_wp, 0.1_wp)
-         config%initial%beta(k) = uniform(-0.1_wp, 0.1_wp)
+         config%initial%alpha(k) = slope*uniform(-1.0_wp, 1.0_wp)
+         config%initial%beta(k) = slope*uniform(-1.0_wp, 1.0_wp)
          config%initial%alpha_rate(k) = uniform(-5.0_wp, 5.0_wp)
          config%initial%beta_rate(k) = uniform(-5.0_wp, 5.0_wp)
+         if (config%model%bending_shapes == 2) cycle
+         config%initial%bubble(k) = uniform(-5.0e-4_wp, 5.0e-4_wp)
+         config%initial%bubble_rate(k) = uniform(-0.5_wp, 0.5_wp)
       end do
       if (config%spacecraft%motion == 'fixed') return
       config%initial%velocity_x = uniform(-2.0_wp, 2.0_wp)

@@ -5,6 +5,8 @@ module test_beams
    use rodyn_case_config, only: case_config
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_assembled, only: assembled_system, new_assembled_system, mass_matrix
+   use rodyn_accelerations, only: dynamics_type, new_dynamics
+   use rodyn_frequencies, only: natural_frequencies
    use rodyn_lapack, only: dsygvd
    use test_testing, only: unittest, new_test, check
    use test_random_scenes, only: allocate_case
@@ -19,9 +21,75 @@ contains
 
    subroutine collect_beams(suite)
       type(unittest), allocatable, intent(out) :: suite(:)
-      suite = [new_test('clamped-free frequencies converge with order 2 or better, distributed inertia', test_distributed), &
+      suite = [new_test('locked hinges and a third bending shape against closed-form frequencies', test_shapes), &
+               new_test('clamped-free frequencies converge with order 2 or better, distributed inertia', test_distributed), &
                new_test('clamped-free frequencies converge with order 2, lumped inertia', test_lumped)]
    end subroutine collect_beams
+
+   !> The same beam, its hinges locked: exact to the shapes. N rods of two shapes have a frequency error of order N^-4 (cubic
+   !> deflections), of three shapes N^-6 (quartic), always from above.
+   subroutine test_shapes(error)
+      type(error_type), allocatable, intent(out) :: error
+      integer, parameter :: pieces(4) = [1, 2, 4, 8]
+      real(wp), parameter :: least_order(2:3) = [3.6_wp, 5.9_wp]
+      real(wp) :: wrong(3, 4), two(3, 4), order
+      character(len=80) :: text
+      integer :: i, mode, shapes
+
+      do shapes = 2, 3
+         wrong = 0.0_wp
+         do i = 1, size(pieces)
+            call locked_beam_errors(pieces(i), shapes, wrong(:, i), error)
+            if (allocated(error)) return
+         end do
+         do mode = 1, 3
+            do i = 1, size(pieces)
+               write (text, '(i0, " shapes, mode ", i0, ", ", i0, " rods: error ", es9.2)') shapes, mode, pieces(i), wrong(mode, i)
+               if (mode > shapes .and. i == 1) cycle ! there is no such mode
+               call check(error, wrong(mode, i) > -1.0e-10_wp, trim(text)//' from below') ! Rayleigh and Ritz
+               if (allocated(error)) return
+               if (i < merge(3, 4, mode == 1) .or. wrong(mode, i) < 1.0e-8_wp) cycle ! not yet in the limit; rounding
+               order = log(wrong(mode, i - 1)/wrong(mode, i))/log(2.0_wp)
+               write (text(len_trim(text) + 1:), '(", order ", f0.2)') order
+               call check(error, order > least_order(shapes), trim(text))
+               if (allocated(error)) return
+            end do
+         end do
+         if (shapes == 2) two = wrong
+      end do
+      ! Four rods of three shapes have 12 unknowns, eight of two have 16.
+      call check(error, all(wrong(:, 3) < two(:, 4)) .and. wrong(1, 3) < 0.05_wp*two(1, 4), &
+                 'three shapes buy less than twice the rods')
+   end subroutine test_shapes
+
+   !> Relative errors of the first three frequencies, with signs; what the beam has not is left zero.
+   subroutine locked_beam_errors(n, shapes, wrong, error)
+      integer, intent(in) :: n, shapes
+      real(wp), intent(out) :: wrong(3)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+      type(scene_type) :: scene
+      type(dynamics_type) :: dynamics
+      real(wp), allocatable :: frequency(:)
+      integer :: modes
+
+      call allocate_case(config, n)
+      config%spacecraft%motion = 'fixed'
+      config%model%bending_shapes = shapes
+      config%model%gauss_points = 5
+      config%chain%length = 1.0_wp/n
+      config%chain%mass_per_length = 1.0_wp
+      config%chain%bending_stiffness = 1.0_wp
+      call new_scene(scene, config, error)
+      if (.not. allocated(error)) call new_dynamics(dynamics, scene, error)
+      if (allocated(error)) return
+      call dynamics%set_locked(spread(.true., 1, n), spread(0.0_wp, 1, n))
+      call natural_frequencies(dynamics%scene, spread(0.0_wp, 1, scene%n_dof), frequency, error)
+      if (allocated(error)) return
+      wrong = 0.0_wp
+      modes = min(3, size(frequency))
+      wrong(:modes) = frequency(:modes)/roots(:modes)**2 - 1.0_wp
+   end subroutine locked_beam_errors
 
    subroutine test_distributed(error)
       type(error_type), allocatable, intent(out) :: error

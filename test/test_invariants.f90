@@ -120,6 +120,8 @@ contains
          mirrored%initial%phi = -config%initial%phi
          mirrored%initial%alpha = -config%initial%alpha
          mirrored%initial%beta = -config%initial%beta
+         mirrored%initial%bubble = -config%initial%bubble
+         mirrored%initial%bubble_rate = -config%initial%bubble_rate
          mirrored%initial%phi_rate = -config%initial%phi_rate
          mirrored%initial%alpha_rate = -config%initial%alpha_rate
          mirrored%initial%beta_rate = -config%initial%beta_rate

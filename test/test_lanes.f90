@@ -131,6 +131,7 @@ contains
       worst = 0.0_wp
       scenes = 0
       do which = 1, n_kinds
+         if (index(kind_name(which), 'bubbles') > 0) cycle ! have no lanes
          do i = 1, 125
             call random_octet(eight, which, 1 + mod(i, 9), found, error)
             if (allocated(error)) return
@@ -142,7 +143,8 @@ contains
                worst(which) = max(worst(which), difference)
             end do
          end do
-         if (scenes(which) < merge(1, 1000, mod(which, n_kinds/2) == 0)) call raise(error, kind_name(which)//': too few scenes')
+         if (scenes(which) < merge(1, 1000, index(kind_name(which), 'exact') > 0)) &
+            call raise(error, kind_name(which)//': too few scenes')
          if (worst(which) < 1.0e-13_wp) cycle
          write (text, '(": relative difference ", es9.2)') worst(which)
          call raise(error, kind_name(which)//trim(text))

@@ -71,6 +71,7 @@ contains
       header%n_rods = n_rods
       header%n_rows = n_rows
       header%ledger = ledger
+      header%bubbles = .true.
    end function sample_header
 
    function sample_report() result(report)
@@ -107,6 +108,8 @@ contains
          row%phi_rate(i) = value(5, i, r)
          row%alpha_rate(i) = value(6, i, r)
          row%beta_rate(i) = value(7, i, r)
+         row%bubble(i) = value(22, i, r)
+         row%bubble_rate(i) = value(23, i, r)
       end do
       row%velocity_x = value(8, 1, r)
       row%velocity_y = value(9, 1, r)

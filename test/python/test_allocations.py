@@ -60,6 +60,7 @@ __attribute__((destructor)) static void report(void) {
 SCENES = {
     # dampers, a kink, a load that varies on a node, ledger
     "flexible": ("dynamic", "distributed", "hinge_damping = 0.02, kink = 0, 0.05, 0", True),
+    "three shapes": ("dynamic", "distributed", "hinge_damping = 0.02, kink = 0, 0.05, 0", True),
     "no ledger": ("dynamic", "distributed", "hinge_damping = 0.02", False),
     "rigid": ("rigid", "distributed", "hinge_damping = 0.02, kink = 0, 0.05, 0", True),
     "lumped": ("rigid", "lumped", "hinge_damping = 0.02", True),
@@ -70,11 +71,12 @@ SCENES = {
 
 def case(scene: str, motion: str, kernel: str, method: str, t_end: float) -> str:
     bending, inertia, hinges, ledger = SCENES[scene]
+    shapes = "bending_shapes = 3, gauss_points = 5," if scene == "three shapes" else ""
     return f"""&case t_end = {t_end:.2f}, n_outputs = 8 /
 &spacecraft motion = '{motion}', mass = 122.5, inertia = 10, hinge_x = 0.35, hinge_y = 0.35 /
 &chain n_rods = 3, length = 1.5, 1.4, 1.3, mass_per_length = 1.7, bending_stiffness = 1.37e4, node_mass = 0.5,
    hinge_stiffness = 6000, 2*4000, {hinges} /
-&model bending = '{bending}', inertia = '{inertia}', kernel = '{kernel}',
+&model bending = '{bending}', inertia = '{inertia}', kernel = '{kernel}', {shapes}
    dampers = '{"exact" if scene.startswith("exact") else "reduced"}' /
 &load component = 'M', value = 1500, t_end = 0.05 /
 &load target = 'node', node = 2, component = 'Y', law = 'sine_squared', value = 50, rate = 40 /

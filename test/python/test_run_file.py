@@ -21,6 +21,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 ROD_STATES = {
     "phi": "rad", "alpha": "rad", "beta": "rad",
     "phi_rate": "rad s-1", "alpha_rate": "rad s-1", "beta_rate": "rad s-1",
+    "bubble": "m", "bubble_rate": "m s-1",
 }
 SCALAR_STATES = {
     "velocity_x": "m s-1", "velocity_y": "m s-1", "omega": "rad s-1",

@@ -217,6 +217,25 @@ def test_natural_frequencies_of_the_main_scene(tmp_path):
     assert np.allclose(found, expected, rtol=2e-4)
 
 
+def test_bubbles_are_in_the_file_balance_and_are_drawn(tmp_path):
+    """One rod clamped by a strong spring and plucked: three shapes, against the program's own frequency."""
+    (tmp_path / "b.nml").write_text(
+        "&case title = 'bubble', t_end = 0.05, n_outputs = 50 /\n&spacecraft motion = 'fixed' /\n"
+        "&chain n_rods = 1, length = 2.0, mass_per_length = 1.5, bending_stiffness = 100.0, hinge_stiffness = 1e4 /\n"
+        "&model bending_shapes = 3, gauss_points = 5 /\n&initial bubble = 0.02 /\n")
+    result_files.subprocess.run([result_files.RODYN, "run", str(tmp_path / "b.nml"), "--output", str(tmp_path / "b.h5")], check=True)
+    with h5py.File(tmp_path / "b.h5") as file:
+        assert file["bubble"][0, 0] == 0.02
+        assert np.abs(file["bubble_rate"]).max() > 0.1
+        assert np.abs(file["energy_residual"]).max() < 1e-6 * file["energy_elastic"][0]
+        assert np.isclose(file["energy_elastic"][0], 0.5 * 204.8 * 100.0 / 2.0**3 * 0.02**2)
+    with open_run(tmp_path / "b.h5") as run:
+        assert np.isclose(largest_deflection(run, 0), 0.02)
+        found = natural_frequencies.natural_frequencies(run)
+        highest = float(re.search(r"frequencies to ([\d.E+-]+) rad/s", run.solver()["reason"])[1])
+    assert np.isclose(found[-1], highest, rtol=0.1)
+
+
 @pytest.mark.parametrize("name", ["rigid", "lumped", "n40", "n1"])
 def test_natural_frequencies_agree_with_the_programs(runs, name):
     """The program names the highest frequency, good to a tenth, when it chooses a method."""

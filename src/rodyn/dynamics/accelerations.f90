@@ -29,7 +29,7 @@ module rodyn_accelerations
       type(scene_type) :: scene
       type(workspace_type) :: work
       type(assembled_system) :: system !! for the assembled kernel only
-      type(joint_recursion), allocatable :: joints !! for locked hinges; allocated when first needed
+      type(joint_recursion), allocatable :: joints !! for locked hinges and the bubble; allocated when first needed
       real(wp), allocatable :: opening_acceleration(:) !! of locked hinges, given (0:n-1) [rad/s^2]
       integer :: n_locks = 0           !! how often hinges were locked or freed: what was derived from the scene is then stale
       type(load_regime) :: regime      !! loads between the last switch and the next
@@ -93,7 +93,7 @@ contains
          self%needs_moments = size(self%scene%hinges%relaxing) > 0 .or. self%system%moving .or. self%scene%hinges%has_locks
          if (size(self%scene%hinges%relaxing) == 0 .and. self%system%moving .and. .not. allocated(self%zero)) &
             allocate (self%zero(self%scene%n_q), source=0.0_wp)
-      else if (has_slaves(self%scene)) then
+      else if (has_slaves(self%scene) .or. self%scene%n_bend == 3) then
          self%path = path_joints
          if (.not. allocated(self%joints)) allocate (self%joints)
          call new_joint_recursion(self%joints, self%scene)
@@ -357,7 +357,7 @@ contains
       ok = all(lane_ok)
    end subroutine lane_accelerations
 
-   !> Lane after lane, for the assembled kernel, for locked hinges and what else has no lanes.
+   !> Lane after lane, for the assembled kernel, for locked hinges, the bubble and what else has no lanes.
    subroutine one_by_one(self, t, q, p, acceleration, ok)
       class(dynamics_type), intent(inout) :: self
       real(wp), intent(in) :: t(lanes)

@@ -3,12 +3,14 @@
 !> Written independently of the recursion, as the second route to the same accelerations. For the columns of N,
 !>     z = (w Vx, w Vy, w^2, phi_m'(2 w + phi_m'), (w + phi_m') alpha_m', (w + phi_m') beta_m'),  m = 1..n;
 !> the article joins the last two for uniform rods, where int m Na = -int m Nb. On a fixed spacecraft the first
-!> three rows and columns are absent. For massless rods all rod integrals are zero. Locked hinges: `rodyn_locks`.
+!> three rows and columns are absent. Bubbles stand behind beta and are treated like alpha and beta. For massless rods
+!> all rod integrals are zero. Locked hinges: `rodyn_locks`.
 module rodyn_assembled
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type, raise
    use rodyn_scene, only: scene_type
+   use rodyn_bending_matrices, only: most_shapes
    use rodyn_locks, only: has_slaves, reduce, expand, reduce_matrix, reactions
    use rodyn_lapack, only: dpotrf, dpotrs, dgesv, dgemv
    implicit none (type, external)
@@ -123,21 +125,20 @@ contains
       call dgesv(scene%n, scene%n_dof, g, scene%n, pivots, b, scene%n, info)
    end subroutine soften
 
-   !> Bending stiffness of the rods: (2 EI/l)((2, 1), (1, 2)) on (alpha, beta).
+   !> Bending stiffness of the rods.
    subroutine add_bending(scene, stiffness)
       type(scene_type), intent(in) :: scene
       real(wp), intent(inout) :: stiffness(:, :)
-      integer :: k, a, b
+      integer :: i, j, k
 
       do k = 1, scene%n
-         a = scene%alpha_at() + k
-         b = scene%beta_at() + k
-         associate (kappa => scene%rods(scene%rod_of(k))%kappa)
-            stiffness(a, a) = stiffness(a, a) + 2.0_wp*kappa
-            stiffness(b, b) = stiffness(b, b) + 2.0_wp*kappa
-            stiffness(a, b) = stiffness(a, b) + kappa
-            stiffness(b, a) = stiffness(b, a) + kappa
-         end associate
+         do j = 1, scene%n_bend
+            do i = 1, scene%n_bend
+               associate (element => stiffness(scene%bend_at(i) + k, scene%bend_at(j) + k))
+                  element = element + scene%bending(scene%rod_of(k))%stiffness(i, j)
+               end associate
+            end do
+         end do
       end do
    end subroutine add_bending
 
@@ -252,7 +253,7 @@ contains
       real(wp), intent(in) :: p(:)
       real(wp), intent(out) :: z(:)
       real(wp) :: w
-      integer :: k
+      integer :: i, k
 
       w = 0.0_wp
       if (scene%n_base > 0) then
@@ -262,9 +263,9 @@ contains
       do k = 1, scene%n
          associate (phi_rate => p(scene%phi_at() + k))
             z(scene%phi_at() + k) = phi_rate*(2.0_wp*w + phi_rate)
-            if (.not. scene%dynamic_bending) cycle
-            z(scene%alpha_at() + k) = (w + phi_rate)*p(scene%alpha_at() + k)
-            z(scene%beta_at() + k) = (w + phi_rate)*p(scene%beta_at() + k)
+            do i = 1, scene%n_bend
+               z(scene%bend_at(i) + k) = (w + phi_rate)*p(scene%bend_at(i) + k)
+            end do
          end associate
       end do
    end subroutine quadratic_rates
@@ -302,36 +303,33 @@ contains
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: sine(0:), cosine(0:) !! of phi (0:n)
       real(wp), intent(in) :: q(:)                 !! coordinates (dof)
-      integer :: j, k, fj, fk, aj, ak, bj, bk
-      real(wp) :: mvv, normal(2), along
+      integer :: i, j, k, fj, fk
+      real(wp) :: mvv, normal(2), along, x(most_shapes), curved(most_shapes)
 
       associate (m => system%m, n => scene%n)
          m = 0.0_wp
          call first_moments(system, scene, sine, cosine, q)
          do k = 1, n
             fk = scene%phi_at() + k
-            associate (rod => scene%rods(scene%rod_of(k)), i => scene%rods(scene%rod_of(k))%inertia)
-               mvv = 0.0_wp
-               if (scene%dynamic_bending) then
-                  ak = scene%alpha_at() + k
-                  bk = scene%beta_at() + k
-                  mvv = rod%second(1)*q(ak)**2 + 2.0_wp*rod%second(2)*q(ak)*q(bk) + rod%second(3)*q(bk)**2
-                  m(ak, ak) = i%aa
-                  m(bk, bk) = i%bb
-                  m(ak, bk) = i%ab
-                  m(bk, ak) = i%ab
-                  call set_pair(m, fk, ak, i%sa)
-                  call set_pair(m, fk, bk, i%sb)
-               end if
-               m(fk, fk) = i%m2 + mvv + rod%length**2*system%outboard(k)
+            x = scene%bends(k, q)
+            associate (rod => scene%rods(scene%rod_of(k)), bend => scene%bending(scene%rod_of(k)))
+               curved = matmul(bend%second, x)
+               mvv = dot_product(x, curved)
+               do i = 1, scene%n_bend
+                  do j = 1, i
+                     call set_pair(m, scene%bend_at(i) + k, scene%bend_at(j) + k, bend%inertia(i, j))
+                  end do
+                  call set_pair(m, fk, scene%bend_at(i) + k, bend%turning(i))
+               end do
+               m(fk, fk) = rod%inertia%m2 + mvv + rod%length**2*system%outboard(k)
                do j = 1, k - 1
                   fj = scene%phi_at() + j
                   normal = scene%rods(scene%rod_of(j))%length*[-sine(j), cosine(j)]
                   call set_pair(m, fj, fk, dot_product(normal, system%static(:, k)))
-                  if (.not. scene%dynamic_bending) cycle
                   along = normal(2)*cosine(k) - normal(1)*sine(k)
-                  call set_pair(m, fj, ak, i%a1*along)
-                  call set_pair(m, fj, bk, i%b1*along)
+                  do i = 1, scene%n_bend
+                     call set_pair(m, fj, scene%bend_at(i) + k, bend%first(i)*along)
+                  end do
                end do
             end associate
          end do
@@ -354,15 +352,15 @@ contains
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: sine(0:), cosine(0:)
       real(wp), intent(in) :: q(:)
-      real(wp) :: arm, mv
+      real(wp) :: arm, mv, x(most_shapes)
       integer :: k
 
       system%outboard(scene%n) = scene%node_mass(scene%n)
       do k = scene%n, 1, -1
          associate (rod => scene%rods(scene%rod_of(k)), i => scene%rods(scene%rod_of(k))%inertia)
             arm = i%m1 + rod%length*system%outboard(k)
-            mv = 0.0_wp
-            if (scene%dynamic_bending) mv = i%a1*q(scene%alpha_at() + k) + i%b1*q(scene%beta_at() + k)
+            x = scene%bends(k, q)
+            mv = dot_product(scene%bending(scene%rod_of(k))%first, x)
             system%static(:, k) = [-arm*sine(k) - mv*cosine(k), arm*cosine(k) - mv*sine(k)]
             system%axial(:, k) = [system%static(2, k), -system%static(1, k)]
             system%outboard(k - 1) = system%outboard(k) + i%m0 + scene%node_mass(k - 1)
@@ -376,17 +374,15 @@ contains
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: sine(0:), cosine(0:)
       real(wp) :: turned(2), swung(2) !! of hinge 0; of all rods together
-      integer :: k, x
+      integer :: i, k, x
 
       associate (m => system%m, row => system%row, n => scene%n, chain => system%outboard(0), body => scene%body)
          turned = [-body%hinge_y, body%hinge_x]
          do k = 1, n
             m(1:2, scene%phi_at() + k) = system%static(:, k)
-            if (.not. scene%dynamic_bending) cycle
-            associate (i => scene%rods(scene%rod_of(k))%inertia)
-               m(1:2, scene%alpha_at() + k) = i%a1*[-sine(k), cosine(k)]
-               m(1:2, scene%beta_at() + k) = i%b1*[-sine(k), cosine(k)]
-            end associate
+            do i = 1, scene%n_bend
+               m(1:2, scene%bend_at(i) + k) = scene%bending(scene%rod_of(k))%first(i)*[-sine(k), cosine(k)]
+            end do
          end do
          ! Row of w: turning the spacecraft about C carries hinge 0 and turns every rod.
          row = 0.0_wp
@@ -445,8 +441,8 @@ contains
       real(wp), intent(in) :: sine(0:), cosine(0:)
       real(wp), intent(in) :: q(:)
       integer, intent(in) :: i
-      real(wp) :: inward(2)
-      integer :: k, column
+      real(wp) :: inward(2), across, x(most_shapes), pull(most_shapes)
+      integer :: j, k, column
 
       column = scene%phi_at() + i
       associate (nm => system%n, rod_i => scene%rods(scene%rod_of(i)))
@@ -458,50 +454,44 @@ contains
          inward = -rod_i%length*[cosine(i), sine(i)]
          do k = i + 1, scene%n
             nm(scene%phi_at() + k, column) = dot_product(system%static(:, k), inward)
-            if (.not. scene%dynamic_bending) cycle
-            associate (inertia => scene%rods(scene%rod_of(k))%inertia, &
-                       across => inward(2)*cosine(k) - inward(1)*sine(k))
-               nm(scene%alpha_at() + k, column) = inertia%a1*across
-               nm(scene%beta_at() + k, column) = inertia%b1*across
-            end associate
+            across = inward(2)*cosine(k) - inward(1)*sine(k)
+            do j = 1, scene%n_bend
+               nm(scene%bend_at(j) + k, column) = scene%bending(scene%rod_of(k))%first(j)*across
+            end do
          end do
-         if (scene%dynamic_bending) then
-            associate (inertia => rod_i%inertia, alpha => q(scene%alpha_at() + i), beta => q(scene%beta_at() + i))
-               nm(scene%alpha_at() + i, column) = -(inertia%aa*alpha + inertia%ab*beta)
-               nm(scene%beta_at() + i, column) = -(inertia%ab*alpha + inertia%bb*beta)
-            end associate
-         end if
+         x = scene%bends(i, q)
+         pull = matmul(scene%bending(scene%rod_of(i))%inertia, x)
+         do j = 1, scene%n_bend
+            nm(scene%bend_at(j) + i, column) = -pull(j)
+         end do
          inward = -system%axial(:, i) ! now of all that lies outboard
          if (scene%n_base > 0) call close_column(system, scene, column, inward)
       end associate
    end subroutine centrifugal_column
 
-   !> Columns of (w + phi_i') alpha_i' and beta_i': points of rod i accelerate by -2 Na e (-2 Nb e).
+   !> Columns of (w + phi_i') alpha_i', beta_i' and so on: points of rod i accelerate by -2 Na e, -2 Nb e ...
    subroutine coriolis_columns(system, scene, sine, cosine, q, i)
       type(assembled_system), intent(inout) :: system
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: sine(0:), cosine(0:)
       real(wp), intent(in) :: q(:)
       integer, intent(in) :: i
-      real(wp) :: force(2, 2)
-      integer :: k, columns(2), j
+      real(wp) :: force(2), x(most_shapes), turn(most_shapes)
+      integer :: j, k, column
 
-      columns = [scene%alpha_at() + i, scene%beta_at() + i]
-      associate (nm => system%n, rod => scene%rods(scene%rod_of(i)), inertia => scene%rods(scene%rod_of(i))%inertia, &
-                 alpha => q(scene%alpha_at() + i), beta => q(scene%beta_at() + i))
-         force(:, 1) = -2.0_wp*inertia%a1*[cosine(i), sine(i)]
-         force(:, 2) = -2.0_wp*inertia%b1*[cosine(i), sine(i)]
-         nm(scene%phi_at() + i, columns(1)) = 2.0_wp*(rod%second(1)*alpha + rod%second(2)*beta)
-         nm(scene%phi_at() + i, columns(2)) = 2.0_wp*(rod%second(2)*alpha + rod%second(3)*beta)
-         do j = 1, 2
-            do k = 1, i - 1
-               associate (length => scene%rods(scene%rod_of(k))%length)
-                  nm(scene%phi_at() + k, columns(j)) = length*dot_product([-sine(k), cosine(k)], force(:, j))
-               end associate
-            end do
-            if (scene%n_base > 0) call close_column(system, scene, columns(j), force(:, j))
+      x = scene%bends(i, q)
+      turn = matmul(scene%bending(scene%rod_of(i))%second, x)
+      do j = 1, scene%n_bend
+         column = scene%bend_at(j) + i
+         force = -2.0_wp*scene%bending(scene%rod_of(i))%first(j)*[cosine(i), sine(i)]
+         system%n(scene%phi_at() + i, column) = 2.0_wp*turn(j)
+         do k = 1, i - 1
+            associate (length => scene%rods(scene%rod_of(k))%length)
+               system%n(scene%phi_at() + k, column) = length*dot_product([-sine(k), cosine(k)], force)
+            end associate
          end do
-      end associate
+         if (scene%n_base > 0) call close_column(system, scene, column, force)
+      end do
    end subroutine coriolis_columns
 
    !> Rows of Vx, Vy, w of a column of N, from the total force and the rows of phi.

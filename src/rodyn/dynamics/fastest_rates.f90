@@ -4,6 +4,7 @@ module rodyn_fastest_rates
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
    use rodyn_scene, only: scene_type
+   use rodyn_bending_matrices, only: bending_matrices
    use rodyn_rod_integrals, only: rod_integrals
    use rodyn_accelerations, only: dynamics_type, new_dynamics
    implicit none (type, external)
@@ -67,9 +68,11 @@ contains
       rigid = scene
       if (.not. scene%dynamic_bending) return
       rigid%dynamic_bending = .false.
+      rigid%n_bend = 0
       rigid%n_dof = scene%n_base + scene%n
       rigid%n_q = rigid%n_dof
       do j = 1, size(rigid%rods)
+         rigid%bending(j) = bending_matrices()
          associate (rod => rigid%rods(j), i => scene%rods(j)%inertia)
             rod%inertia = rod_integrals(m0=i%m0, m1=i%m1, m2=i%m2)
             rod%central = i%m0*i%m2 - i%m1**2

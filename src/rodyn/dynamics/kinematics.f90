@@ -2,7 +2,8 @@
 module rodyn_kinematics
    use rodyn_kinds, only: wp
    use rodyn_scene, only: scene_type
-   use rodyn_hinge_law, only: hinge_state, hinge_rates, spring_energy
+   use rodyn_bending_matrices, only: most_shapes
+   use rodyn_hinge_law, only: hinge_state, hinge_rates, spring_energy, openings
    use rodyn_three_moments, only: slopes_from_moments
    implicit none (type, external)
    private
@@ -68,7 +69,7 @@ contains
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: q(:), p(:)
       type(chain_sums), intent(out) :: sums
-      real(wp) :: u(2), place(2), axis(2), normal(2), omega, w, x(2), xr(2), first(2), flow(2), spin, inertia
+      real(wp) :: u(2), place(2), axis(2), normal(2), omega, w, x(most_shapes), xr(most_shapes), first(2), flow(2), spin, inertia
       integer :: k
 
       call at_hinge_0(scene, q, p, place, u, omega)
@@ -77,20 +78,16 @@ contains
          axis = [cos(q(scene%phi_at() + k)), sin(q(scene%phi_at() + k))]
          normal = [-axis(2), axis(1)]
          w = omega + p(scene%phi_at() + k)
-         x = 0.0_wp
-         xr = 0.0_wp
-         if (scene%dynamic_bending) then
-            x = [q(scene%alpha_at() + k), q(scene%beta_at() + k)]
-            xr = [p(scene%alpha_at() + k), p(scene%beta_at() + k)]
-         end if
-         associate (rod => scene%rods(scene%rod_of(k)), i => scene%rods(scene%rod_of(k))%inertia)
-            first = i%m1*axis + (i%a1*x(1) + i%b1*x(2))*normal           ! int m (s e + v n)
-            flow = w*[-first(2), first(1)] + (i%a1*xr(1) + i%b1*xr(2))*normal
-            inertia = i%m2 + i%aa*x(1)**2 + 2.0_wp*i%ab*x(1)*x(2) + i%bb*x(2)**2
-            spin = w*inertia + i%sa*xr(1) + i%sb*xr(2)
+         x = scene%bends(k, q)
+         xr = scene%bends(k, p)
+         associate (rod => scene%rods(scene%rod_of(k)), i => scene%rods(scene%rod_of(k))%inertia, &
+                    bend => scene%bending(scene%rod_of(k)))
+            first = i%m1*axis + dot_product(bend%first, x)*normal           ! int m (s e + v n)
+            flow = w*[-first(2), first(1)] + dot_product(bend%first, xr)*normal
+            inertia = i%m2 + dot_product(x, matmul(bend%inertia, x))
+            spin = w*inertia + dot_product(bend%turning, xr)
             sums%kinetic = sums%kinetic + 0.5_wp*(i%m0*sum(u**2) + w*(2.0_wp*spin - w*inertia) + &
-                                                  i%aa*xr(1)**2 + 2.0_wp*i%ab*xr(1)*xr(2) + i%bb*xr(2)**2) + &
-                           dot_product(u, flow)
+                                                  dot_product(xr, matmul(bend%inertia, xr))) + dot_product(u, flow)
             sums%momentum = sums%momentum + i%m0*u + flow
             sums%turning = sums%turning + cross(place, i%m0*u + flow) + cross(first, u) + spin
             place = place + rod%length*axis
@@ -143,6 +140,14 @@ contains
       end associate
       elastic_energy = spring_energy(scene%hinges, theta)
       if (.not. (scene%dynamic_bending .or. scene%quasistatic)) return
+      if (scene%dynamic_bending) then
+         do k = 1, scene%n
+            associate (x => scene%bends(k, q))
+               elastic_energy = elastic_energy + 0.5_wp*dot_product(x, matmul(scene%bending(scene%rod_of(k))%stiffness, x))
+            end associate
+         end do
+         return
+      end if
       call slopes(scene, q, p, alpha, beta, alpha_rate, beta_rate)
       do k = 1, scene%n
          elastic_energy = elastic_energy + scene%rods(scene%rod_of(k))%kappa* &

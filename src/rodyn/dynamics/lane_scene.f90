@@ -45,7 +45,8 @@ contains
    !> May this scene stand in a lane?
    pure logical function suits_lanes(scene)
       type(scene_type), intent(in) :: scene
-      suits_lanes = .not. scene%assembled .and. size(scene%hinges%relaxing) == 0 .and. .not. scene%hinges%has_locks
+      suits_lanes = .not. scene%assembled .and. size(scene%hinges%relaxing) == 0 .and. .not. scene%hinges%has_locks .and. &
+                    scene%n_bend < 3
       if (scene%quasistatic) suits_lanes = suits_lanes .and. .not. scene%hinges%driven .and. size(scene%hinges%mechanisms) == 0
    end function suits_lanes
 

@@ -7,6 +7,7 @@
 module rodyn_linearisation
    use rodyn_kinds, only: wp
    use rodyn_scene, only: scene_type
+   use rodyn_bending_matrices, only: most_shapes
    use rodyn_hinge_law, only: hinge_tangent
    implicit none (type, external)
    private
@@ -130,8 +131,9 @@ contains
       real(wp), intent(in) :: e(2), n(2), w, dw, wr, inner(2), d_inner(2), moment(0:)
       real(wp), intent(inout) :: force(2), d_force(2), dr(:)
       real(wp) :: ae, an, d_ae, d_an, fe, fn, d_fe, d_fn, d_phi
-      real(wp) :: x(2), v(2), acc(2), dx(2), dv(2), bx(2), sx(2), mv, d_mv, d_mv_rate, mv_rate
-      integer :: f, ia, ib
+      real(wp), dimension(most_shapes) :: x, v, acc, dx, dv, row, sx
+      real(wp) :: mv, d_mv, d_mv_rate, mv_rate
+      integer :: f, j
 
       f = scene%phi_at() + k
       d_phi = dq(f)
@@ -146,38 +148,34 @@ contains
          d_fn = i%m0*d_an
          dr(f) = dr(f) + i%m1*d_an
          if (scene%dynamic_bending) then
-            ia = scene%alpha_at() + k
-            ib = scene%beta_at() + k
-            x = [q(ia), q(ib)]
-            v = [p(ia), p(ib)]
-            acc = [a(ia), a(ib)]
-            dx = [dq(ia), dq(ib)]
-            dv = [dp(ia), dp(ib)]
-            mv = i%a1*x(1) + i%b1*x(2)
-            mv_rate = i%a1*v(1) + i%b1*v(2)
-            d_mv = i%a1*dx(1) + i%b1*dx(2)
-            d_mv_rate = i%a1*dv(1) + i%b1*dv(2)
-            fe = fe - wr*mv - 2.0_wp*w*mv_rate
-            fn = fn - w**2*mv + i%a1*acc(1) + i%b1*acc(2)
-            d_fe = d_fe - wr*d_mv - 2.0_wp*(dw*mv_rate + w*d_mv_rate)
-            d_fn = d_fn - 2.0_wp*w*dw*mv - w**2*d_mv
-            sx = times(rod%second, x)
-            dr(f) = dr(f) - d_mv*ae - mv*d_ae + 2.0_wp*wr*dot_product(sx, dx) + 2.0_wp*dw*dot_product(sx, v) + &
-                    2.0_wp*w*(dot_product(times(rod%second, dx), v) + dot_product(sx, dv))
-            bx = times([i%aa, i%ab, i%bb], 2.0_wp*w*dw*x + w**2*dx)
-            dr(ia) = i%a1*d_an - bx(1) + moment(k - 1) + rod%kappa*(2.0_wp*dx(1) + dx(2))
-            dr(ib) = i%b1*d_an - bx(2) - moment(k) + rod%kappa*(dx(1) + 2.0_wp*dx(2))
+            associate (bend => scene%bending(scene%rod_of(k)))
+               x = scene%bends(k, q)
+               v = scene%bends(k, p)
+               acc = scene%bends(k, a)
+               dx = scene%bends(k, dq)
+               dv = scene%bends(k, dp)
+               mv = dot_product(bend%first, x)
+               mv_rate = dot_product(bend%first, v)
+               d_mv = dot_product(bend%first, dx)
+               d_mv_rate = dot_product(bend%first, dv)
+               fe = fe - wr*mv - 2.0_wp*w*mv_rate
+               fn = fn - w**2*mv + dot_product(bend%first, acc)
+               d_fe = d_fe - wr*d_mv - 2.0_wp*(dw*mv_rate + w*d_mv_rate)
+               d_fn = d_fn - 2.0_wp*w*dw*mv - w**2*d_mv
+               sx = matmul(bend%second, x)
+               dr(f) = dr(f) - d_mv*ae - mv*d_ae + 2.0_wp*wr*dot_product(sx, dx) + 2.0_wp*dw*dot_product(sx, v) + &
+                       2.0_wp*w*(dot_product(matmul(bend%second, dx), v) + dot_product(sx, dv))
+               row = bend%first*d_an - matmul(bend%inertia, 2.0_wp*w*dw*x + w**2*dx) + matmul(bend%stiffness, dx)
+               row(1) = row(1) + moment(k - 1)
+               row(2) = row(2) - moment(k)
+               do j = 1, scene%n_bend
+                  dr(scene%bend_at(j) + k) = row(j)
+               end do
+            end associate
          end if
          force = force + fe*e + fn*n
          d_force = d_force + (d_fe - d_phi*fn)*e + (d_fn + d_phi*fe)*n
       end associate
    end subroutine add_rod
-
-   !> Symmetric 2x2 matrix (1,1), (1,2), (2,2) times a vector.
-   pure function times(matrix, x) result(y)
-      real(wp), intent(in) :: matrix(3), x(2)
-      real(wp) :: y(2)
-      y = [matrix(1)*x(1) + matrix(2)*x(2), matrix(2)*x(1) + matrix(3)*x(2)]
-   end function times
 
 end module rodyn_linearisation

@@ -1,5 +1,5 @@
 !> The motion of a scene as first-order equations: y = (q, p [, work of the loads, dissipated energy]). Behind the
-!> coordinates of the article, q ends with the rotations of relaxing hinges, if there are any (`rodyn_hinge_law`).
+!> coordinates of the article (and the bubbles), q ends with the rotations of relaxing hinges, if there are any (`rodyn_hinge_law`).
 !>
 !> The two integrals are there only with a ledger. They take no part in step-size control, so that a run with a
 !> ledger makes the same steps as one without.
@@ -91,6 +91,7 @@ contains
          if (.not. scene%dynamic_bending) return
          call place(scene%alpha_at(), initial%alpha, initial%alpha_rate)
          call place(scene%beta_at(), initial%beta, initial%beta_rate)
+         if (scene%n_bend == 3) call place(scene%bend_at(3), initial%bubble, initial%bubble_rate)
       end associate
 
    contains
@@ -410,7 +411,8 @@ contains
       end associate
    end subroutine jacobian
 
-   !> Factor 1 - gamma J in O(n), J without the rows of the two powers. With locked hinges by the dense Jacobian: O(n^3).
+   !> Factor 1 - gamma J in O(n), J without the rows of the two powers. With locked hinges or bubbles by the dense
+   !> Jacobian: O(n^3).
    subroutine factorise_newton(self, t, y, gamma, fresh, ok)
       class(motion_type), intent(inout) :: self
       real(wp), intent(in) :: t
@@ -420,7 +422,7 @@ contains
       logical, intent(out) :: ok
       real(wp) :: a(self%n_dof)
 
-      if (self%dynamics%scene%hinges%has_locks) then
+      if (is_dense(self)) then
          call factorise_dense(self, t, y, gamma, fresh, ok)
          return
       end if
@@ -436,11 +438,17 @@ contains
       end associate
    end subroutine factorise_newton
 
+   !> The O(n) factorisation knows neither locked hinges nor a third bending shape.
+   pure logical function is_dense(self)
+      class(motion_type), intent(in) :: self
+      is_dense = self%dynamics%scene%hinges%has_locks .or. self%dynamics%scene%n_bend == 3
+   end function is_dense
+
    !> x <- (1 - gamma J)^-1 x.
    subroutine solve_newton(self, x)
       class(motion_type), intent(inout) :: self
       real(wp), contiguous, intent(inout) :: x(:)
-      if (self%dynamics%scene%hinges%has_locks) then
+      if (is_dense(self)) then
          call solve_dense(self, x)
       else
          call self%newton%solve(self%dynamics%scene, x)

@@ -1,4 +1,5 @@
-!> Accelerations in O(n) of a chain some of whose hinges are locked, for every kind of rod: MODEL sec. 4.2 with moments.
+!> Accelerations in O(n) of a chain of every kind of rod, with or without the bubble, of whose hinges any may be locked:
+!> MODEL sec. 4.2 with moments.
 !>
 !> A free hinge passes a force and a moment that is known (T of its spring and damper). A locked one passes a moment that
 !> is not known, but makes the angular accelerations of the two end tangents equal, up to a given sigma. So the chain
@@ -18,7 +19,7 @@ module rodyn_recursion_joints
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp
    use rodyn_scene, only: scene_type
-   use rodyn_rod_bending, only: rod_bending, new_rod_bending, most_shapes
+   use rodyn_bending_matrices, only: bending_matrices, most_shapes
    implicit none (type, external)
    private
    public :: joint_recursion, new_joint_recursion, joint_accelerations
@@ -33,10 +34,9 @@ module rodyn_recursion_joints
       real(wp) :: t0 = 0.0_wp, t(3) = 0.0_wp !! free inside: tau = t0 - t(1:2) A; locked: -T = t0 + t (A, tau)
    end type rod_pass
 
-   !> Constants of the distinct rods, and memory. One per thread.
+   !> Memory. One per thread.
    type :: joint_recursion
-      type(rod_bending), allocatable :: rods(:) !! as `scene%rods`
-      type(rod_pass), allocatable :: pass(:)    !! (n)
+      type(rod_pass), allocatable :: pass(:) !! (n)
    end type joint_recursion
 
 contains
@@ -45,12 +45,8 @@ contains
    subroutine new_joint_recursion(recursion, scene)
       type(joint_recursion), intent(out) :: recursion
       type(scene_type), intent(in) :: scene
-      integer :: j
 
-      allocate (recursion%rods(size(scene%rods)), recursion%pass(scene%n))
-      do j = 1, size(scene%rods)
-         recursion%rods(j) = new_rod_bending(scene%rods(j), merge(2, 0, scene%dynamic_bending))
-      end do
+      allocate (recursion%pass(scene%n))
    end subroutine new_joint_recursion
 
    !> p' for given q, p and loads, and the moments of locked hinges. Allocates nothing.
@@ -81,7 +77,7 @@ contains
             bias(1) = bias(1) - (node_force(1, k)*cosine(k) + node_force(2, k)*sine(k))
             bias(2) = bias(2) - (node_force(2, k)*cosine(k) - node_force(1, k)*sine(k))
          end if
-         associate (pass => recursion%pass(k), bending => recursion%rods(scene%rod_of(k)))
+         associate (pass => recursion%pass(k), bending => scene%bending(scene%rod_of(k)))
             call rod_equations(scene, bending, k, q, p, elastic, inertia, bias, pass, h, c)
             call eliminate_bending(bending%n, h, c, pass, inertia, bias, smallest)
             if (locked(k - 1)) then
@@ -114,7 +110,7 @@ contains
    !> end tangent by W' + beta''. Formed in (A, W', x) and brought to tau = W' + alpha''.
    pure subroutine rod_equations(scene, bending, k, q, p, elastic, inertia, bias, pass, h, c)
       type(scene_type), intent(in) :: scene
-      type(rod_bending), intent(in) :: bending
+      type(bending_matrices), intent(in) :: bending
       integer, intent(in) :: k
       real(wp), intent(in) :: q(:), p(:)
       logical, intent(in) :: elastic
@@ -127,12 +123,8 @@ contains
 
       w = p(scene%phi_at() + k)
       if (scene%n_base > 0) w = w + p(3)
-      x = 0.0_wp
-      rate = 0.0_wp
-      do i = 1, bending%n
-         x(i) = q(scene%phi_at() + i*scene%n + k)
-         rate(i) = p(scene%phi_at() + i*scene%n + k)
-      end do
+      x = scene%bends(k, q)
+      rate = scene%bends(k, p)
       associate (integrals => scene%rods(scene%rod_of(k))%inertia, length => scene%rods(scene%rod_of(k))%length)
          ! The rod. (Fixed sizes keep the products off the heap; rows beyond the rod's coordinates are zero.)
          mv = dot_product(bending%first, x)
@@ -307,7 +299,7 @@ contains
       omega_rate = node(3)
       do k = 1, scene%n
          associate (pass => recursion%pass(k), length => scene%rods(scene%rod_of(k))%length)
-            nb = recursion%rods(scene%rod_of(k))%n
+            nb = scene%n_bend
             node(1:2) = [pass%cd*node(1) + pass%sd*node(2), pass%cd*node(2) - pass%sd*node(1)]
             if (locked(k - 1)) then
                node(3) = node(3) + opening_acceleration(k - 1)

@@ -41,6 +41,7 @@ module rodyn_case_config
       character(len=name_length) :: formulation = 'consistent' !! 'consistent' or 'paper'
       character(len=name_length) :: inertia = 'distributed'    !! 'distributed' or 'lumped'
       character(len=name_length) :: bending = 'dynamic'        !! 'dynamic', 'quasistatic' or 'rigid'
+      integer :: bending_shapes = 2                            !! shapes of a rod that bends as motion: 2, or 3 with the bubble
       character(len=name_length) :: dampers = 'reduced'        !! 'reduced' or 'exact', matters when quasistatic
       integer :: gauss_points = 4                              !! points of the rule for the rod integrals
       character(len=name_length) :: kernel = 'recursive'       !! 'recursive' or 'assembled'
@@ -51,9 +52,11 @@ module rodyn_case_config
       real(wp), allocatable :: phi(:)        !! chord angles (1:n) [rad]
       real(wp), allocatable :: alpha(:)      !! inner end slopes (1:n) [rad]
       real(wp), allocatable :: beta(:)       !! outer end slopes (1:n) [rad]
+      real(wp), allocatable :: bubble(:)     !! deflections of the third shape in mid-rod (1:n) [m]
       real(wp), allocatable :: phi_rate(:)   !! (1:n) [rad/s]
       real(wp), allocatable :: alpha_rate(:) !! (1:n) [rad/s]
       real(wp), allocatable :: beta_rate(:)  !! (1:n) [rad/s]
+      real(wp), allocatable :: bubble_rate(:) !! (1:n) [m/s]
       real(wp) :: velocity_x = 0.0_wp        !! Vx, moving frame [m/s]
       real(wp) :: velocity_y = 0.0_wp        !! Vy, moving frame [m/s]
       real(wp) :: omega = 0.0_wp             !! w [rad/s]

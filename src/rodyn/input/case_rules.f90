@@ -95,29 +95,42 @@ contains
             "bending = 'quasistatic' is not possible with inertia = 'distributed'; "//&
             "take 'dynamic' or 'rigid', or inertia = 'lumped'")
       end if
+      if (.not. is_sound(checked, 'model', 1, 'bending_shapes') .or. config%model%bending_shapes /= 3) return
+      if (config%model%bending /= 'dynamic') then
+         call blame(checked, 'model', 1, 'bending_shapes', "3 is possible with bending = 'dynamic' only")
+      else if (is_sound(checked, 'model', 1, 'gauss_points') .and. config%model%gauss_points < 5) then
+         call blame(checked, 'model', 1, 'bending_shapes', &
+                    '3 needs gauss_points = 5 or more (the square of the third shape has degree 8)')
+      end if
    end subroutine check_model
 
    !> Only dynamic bending has slopes of its own; only rigid rods need no stiffness.
    subroutine check_bending(checked, config)
       type(checked_document), intent(inout) :: checked
       type(case_config), intent(in) :: config
+      character(len=:), allocatable :: reason
 
       if (.not. is_sound(checked, 'model', 1, 'bending')) return
       if (config%model%bending /= 'rigid') call require(checked, 'chain', 1, 'bending_stiffness', &
          "unless bending = 'rigid'")
-      if (config%model%bending == 'dynamic') return
-      call require_zero('alpha', config%initial%alpha)
-      call require_zero('beta', config%initial%beta)
-      call require_zero('alpha_rate', config%initial%alpha_rate)
-      call require_zero('beta_rate', config%initial%beta_rate)
+      if (config%model%bending /= 'dynamic') then
+         reason = "bending = '"//trim(config%model%bending)//"'"
+         call require_zero('alpha', config%initial%alpha)
+         call require_zero('beta', config%initial%beta)
+         call require_zero('alpha_rate', config%initial%alpha_rate)
+         call require_zero('beta_rate', config%initial%beta_rate)
+      end if
+      if (config%model%bending_shapes == 3) return
+      reason = 'bending_shapes = 2'
+      call require_zero('bubble', config%initial%bubble)
+      call require_zero('bubble_rate', config%initial%bubble_rate)
 
    contains
 
       subroutine require_zero(key, x)
          character(len=*), intent(in) :: key
          real(wp), intent(in) :: x(:)
-         if (any(abs(x) > 0.0_wp)) call blame(checked, 'initial', 1, key, &
-            "must be 0 when bending = '"//trim(config%model%bending)//"'")
+         if (any(abs(x) > 0.0_wp)) call blame(checked, 'initial', 1, key, 'must be 0 when '//reason)
       end subroutine require_zero
 
    end subroutine check_bending

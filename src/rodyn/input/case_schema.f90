@@ -63,6 +63,8 @@ module rodyn_case_schema
          help='mass along the rods, or half of it at each of their ends'), &
       schema_row('model', 'bending', type_word, default="'dynamic'", words='dynamic|quasistatic|rigid', &
          help="dynamic needs inertia = 'distributed', quasistatic needs 'lumped'"), &
+      schema_row('model', 'bending_shapes', type_integer, default='2', rule=in_range, low=2.0_wp, high=3.0_wp, &
+         help="of a rod, bending = 'dynamic': 2 are its end slopes; 3 adds a bubble between (gauss_points >= 5)"), &
       schema_row('model', 'dampers', type_word, default="'reduced'", words='reduced|exact', &
          help='of quasistatic bending: reduced is accurate to (D w/C)^2, exact adds a state per damped hinge'), &
       schema_row('model', 'gauss_points', type_integer, default='4', rule=in_range, low=1.0_wp, high=200.0_wp, &
@@ -75,11 +77,15 @@ module rodyn_case_schema
          help="slope at the inner end; bending = 'dynamic' only"), &
       schema_row('initial', 'beta', type_real, rods, 'rad', '0.0', &
          help="slope at the outer end; bending = 'dynamic' only"), &
+      schema_row('initial', 'bubble', type_real, rods, 'm', '0.0', &
+         help="deflection by the third shape in mid-rod; bending_shapes = 3 only"), &
       schema_row('initial', 'phi_rate', type_real, rods, 'rad/s', '0.0', help='rate of phi'), &
       schema_row('initial', 'alpha_rate', type_real, rods, 'rad/s', '0.0', &
          help="rate of alpha; bending = 'dynamic' only"), &
       schema_row('initial', 'beta_rate', type_real, rods, 'rad/s', '0.0', &
          help="rate of beta; bending = 'dynamic' only"), &
+      schema_row('initial', 'bubble_rate', type_real, rods, 'm/s', '0.0', &
+         help="rate of bubble; bending_shapes = 3 only"), &
       schema_row('initial', 'velocity_x', type_real, unit='m/s', default='0.0', &
          help='Vx of the spacecraft, moving axes'), &
       schema_row('initial', 'velocity_y', type_real, unit='m/s', default='0.0', &

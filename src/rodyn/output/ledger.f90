@@ -27,6 +27,12 @@ contains
             row%phi = q(scene%phi_at() + 1:scene%phi_at() + scene%n)
             row%phi_rate = p(scene%phi_at() + 1:scene%phi_at() + scene%n)
             call slopes(scene, q, p, row%alpha, row%beta, row%alpha_rate, row%beta_rate)
+            row%bubble = 0.0_wp
+            row%bubble_rate = 0.0_wp
+            if (scene%n_bend == 3) then
+               row%bubble = q(scene%bend_at(3) + 1:scene%bend_at(3) + scene%n)
+               row%bubble_rate = p(scene%bend_at(3) + 1:scene%bend_at(3) + scene%n)
+            end if
             if (motion%free) then
                row%displacement_x = q(1)
                row%displacement_y = q(2)

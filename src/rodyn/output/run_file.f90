@@ -14,8 +14,9 @@ module rodyn_run_file
    use rodyn_kinds, only: i8, wp
    use rodyn_posix, only: host_name, ignore_file_size_signal, is_directory, is_writable, parent_directory, path_exists, &
       process_id, remove_file, rename_new, rename_over, sync_path, utc_now
-   use rodyn_run_layout, only: i_alpha, i_alpha_rate, i_angular_momentum, i_beta, i_beta_rate, i_displacement_x, &
-      i_displacement_y, i_energy_dissipated, i_energy_elastic, i_energy_kinetic, i_energy_residual, i_momentum_x, &
+   use rodyn_run_layout, only: i_alpha, i_alpha_rate, i_angular_momentum, i_beta, i_beta_rate, i_bubble, i_bubble_rate, &
+      i_displacement_x, i_displacement_y, i_energy_dissipated, i_energy_elastic, i_energy_kinetic, i_energy_residual, &
+      i_momentum_x, &
       i_momentum_y, i_omega, i_phi, i_phi_rate, i_rotation, i_time, i_velocity_x, i_velocity_y, i_work_external, &
       n_run_variables, run_coordinates, run_variables, solver_group, events_group
    implicit none (type, external)
@@ -36,6 +37,7 @@ module rodyn_run_file
       integer :: n_rods = 0       !! n
       integer :: n_rows = 0       !! rows to expect; 0: unknown. Only sizes the blocks
       logical :: ledger = .true.  !! with energies and momenta
+      logical :: bubbles = .false. !! with the third bending shape
       integer :: compression = 4  !! gzip level, 0..9
    end type run_header
 
@@ -48,6 +50,8 @@ module rodyn_run_file
       real(wp), allocatable :: phi_rate(:)     !! (n) [rad/s]
       real(wp), allocatable :: alpha_rate(:)   !! (n) [rad/s]
       real(wp), allocatable :: beta_rate(:)    !! (n) [rad/s]
+      real(wp), allocatable :: bubble(:)       !! deflections by the third bending shape in mid-rod (n) [m]
+      real(wp), allocatable :: bubble_rate(:)  !! (n) [m/s]
       real(wp) :: velocity_x = 0.0_wp          !! moving frame [m/s]
       real(wp) :: velocity_y = 0.0_wp          !! moving frame [m/s]
       real(wp) :: omega = 0.0_wp               !! [rad/s]
@@ -97,6 +101,7 @@ module rodyn_run_file
       character(len=:), allocatable :: temporary_path
       logical, private :: force = .false.
       logical, private :: ledger = .true.
+      logical, private :: bubbles = .false.
       integer, private :: n_rods = 0
       integer, private :: block_rows = 0
       integer, private :: waiting = 0                  !! rows in the columns
@@ -126,6 +131,7 @@ contains
 
       allocate (row%phi(n_rods), row%alpha(n_rods), row%beta(n_rods), source=0.0_wp)
       allocate (row%phi_rate(n_rods), row%alpha_rate(n_rods), row%beta_rate(n_rods), source=0.0_wp)
+      allocate (row%bubble(n_rods), row%bubble_rate(n_rods), source=0.0_wp)
    end function new_run_row
 
    !> Let the finished file have another name, replacing what has it: the rows of a stopped run do not take the
@@ -168,6 +174,7 @@ contains
       logical, intent(in) :: force                        !! `finish` may replace an existing file
       type(error_type), allocatable, intent(out) :: error
       integer :: i
+      logical :: used
 
       call check_output_path(path, force, error)
       if (allocated(error)) return
@@ -177,13 +184,16 @@ contains
       self%temporary_path = free_temporary_name(path)
       self%force = force
       self%ledger = header%ledger
+      self%bubbles = header%bubbles
       self%n_rods = header%n_rods
       self%block_rows = rows_per_block(header)
       self%waiting = 0
       self%n_rows = 0_i8
       self%last_time = 0.0_wp
       do i = 1, n_run_variables
-         self%columns(i) = new_column(header, run_variables(i)%per_rod, .not. run_variables(i)%ledger .or. self%ledger)
+         used = self%ledger .or. .not. run_variables(i)%ledger
+         if (i == i_bubble .or. i == i_bubble_rate) used = self%bubbles
+         self%columns(i) = new_column(header, run_variables(i)%per_rod, used)
       end do
 
       call self%file%create(self%temporary_path, error)
@@ -221,6 +231,10 @@ contains
          columns(i_displacement_x)%scalars(at) = row%displacement_x
          columns(i_displacement_y)%scalars(at) = row%displacement_y
          columns(i_rotation)%scalars(at) = row%rotation
+         if (self%bubbles) then
+            columns(i_bubble)%rods(:, at) = row%bubble
+            columns(i_bubble_rate)%rods(:, at) = row%bubble_rate
+         end if
          if (self%ledger) then
             columns(i_energy_kinetic)%scalars(at) = row%energy_kinetic
             columns(i_energy_elastic)%scalars(at) = row%energy_elastic

@@ -5,7 +5,7 @@ module rodyn_run_layout
    public :: run_variable, run_coordinate, run_variables, run_coordinates, n_run_variables, solver_group, events_group
    public :: i_time, i_phi, i_alpha, i_beta, i_phi_rate, i_alpha_rate, i_beta_rate, i_velocity_x, i_velocity_y, i_omega, &
       i_displacement_x, i_displacement_y, i_rotation, i_energy_kinetic, i_energy_elastic, i_energy_dissipated, &
-      i_work_external, i_energy_residual, i_momentum_x, i_momentum_y, i_angular_momentum
+      i_work_external, i_energy_residual, i_momentum_x, i_momentum_y, i_angular_momentum, i_bubble, i_bubble_rate
 
    !> One data set that grows along time.
    type :: run_variable
@@ -34,9 +34,10 @@ module rodyn_run_layout
       enumerator :: i_velocity_x, i_velocity_y, i_omega, i_displacement_x, i_displacement_y, i_rotation
       enumerator :: i_energy_kinetic, i_energy_elastic, i_energy_dissipated, i_work_external, i_energy_residual
       enumerator :: i_momentum_x, i_momentum_y, i_angular_momentum
+      enumerator :: i_bubble, i_bubble_rate ! only with three bending shapes
    end enum
 
-   integer, parameter :: n_run_variables = i_angular_momentum
+   integer, parameter :: n_run_variables = i_bubble_rate
 
    logical, parameter :: rod = .true., scalar = .false. ! per_rod
    logical, parameter :: state = .false., books = .true. ! ledger
@@ -62,7 +63,9 @@ module rodyn_run_layout
       run_variable('energy_residual', 'J', scalar, books, 'kinetic + elastic + dissipated - work - their start'), &
       run_variable('momentum_x', 'kg m s-1', scalar, books, 'linear momentum, inertial x axis'), &
       run_variable('momentum_y', 'kg m s-1', scalar, books, 'linear momentum, inertial y axis'), &
-      run_variable('angular_momentum', 'kg m2 s-1', scalar, books, 'angular momentum about the inertial origin')]
+      run_variable('angular_momentum', 'kg m2 s-1', scalar, books, 'angular momentum about the inertial origin'), &
+      run_variable('bubble', 'm', rod, state, 'deflection by the third bending shape in the middle of the rod'), &
+      run_variable('bubble_rate', 'm s-1', rod, state, 'rate of bubble')]
 
    type(run_coordinate), parameter :: run_coordinates(3) = [ &
       run_coordinate('rod', 1, 0, 'rod, counted from the spacecraft'), &

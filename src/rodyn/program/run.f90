@@ -93,6 +93,7 @@ contains
       header%n_rods = scene%n
       header%n_rows = config%n_outputs + 1
       header%ledger = config%output%ledger
+      header%bubbles = config%model%bending_shapes == 3
       header%compression = config%output%compression
       if (present(input_text)) header%input = input_text
       call recorder%file%create(path, header, replace, error)

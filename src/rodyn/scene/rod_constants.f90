@@ -2,7 +2,7 @@
 module rodyn_rod_constants
    use rodyn_kinds, only: wp
    use rodyn_quadrature, only: gauss_rule
-   use rodyn_rod_integrals, only: rod_integrals, new_rod_integrals
+   use rodyn_rod_integrals, only: rod_integrals, new_rod_integrals, bubble_stiffness
    implicit none (type, external)
    private
    public :: rod_constants, new_rod_constants
@@ -17,6 +17,7 @@ module rodyn_rod_constants
       real(wp) :: bending_stiffness = 0.0_wp !! EI [N m^2]
       real(wp) :: kappa = 0.0_wp             !! 2 EI / l: elastic energy is kappa (alpha^2 + alpha beta + beta^2) [N m]
       type(rod_integrals) :: inertia         !! all zero when lumped; shape integrals zero when rigid
+      real(wp) :: bubble(3) = 0.0_wp         !! int EI N'' Nc'' with Na, Nb, Nc
       real(wp) :: second(3) = 0.0_wp         !! aa, ab, bb where they are of second order: zero in `paper`
       real(wp) :: b_inverse(3) = 0.0_wp      !! B^-1: (1,1), (1,2), (2,2) [1/(kg m^2)]
       real(wp) :: g(2) = 0.0_wp              !! [1/m]
@@ -56,6 +57,7 @@ contains
       mass = mass_per_length
       rod%inertia = new_rod_integrals(length, mass, rule)
       if (flexible) then
+         rod%bubble = bubble_stiffness(length, spread(bending_stiffness, 1, size(rule%points)), rule)
          if (consistent) rod%second = [rod%inertia%aa, rod%inertia%ab, rod%inertia%bb]
          call reduce(rod, ok)
       else

@@ -4,7 +4,7 @@ module rodyn_rod_integrals
    use rodyn_quadrature, only: gauss_rule
    implicit none (type, external)
    private
-   public :: rod_integrals, new_rod_integrals, shape_alpha, shape_beta
+   public :: rod_integrals, new_rod_integrals, shape_alpha, shape_beta, shape_bubble, bubble_stiffness
 
    !> Integrals over one rod, 0 <= s <= l; m(s) is its mass per length.
    type :: rod_integrals
@@ -18,6 +18,11 @@ module rodyn_rod_integrals
       real(wp) :: aa = 0.0_wp !! int m Na^2 [kg m^2]
       real(wp) :: ab = 0.0_wp !! int m Na Nb [kg m^2]
       real(wp) :: bb = 0.0_wp !! int m Nb^2 [kg m^2]
+      real(wp) :: c1 = 0.0_wp !! int m Nc [kg]
+      real(wp) :: sc = 0.0_wp !! int m s Nc [kg m]
+      real(wp) :: ac = 0.0_wp !! int m Na Nc [kg m]
+      real(wp) :: bc = 0.0_wp !! int m Nb Nc [kg m]
+      real(wp) :: cc = 0.0_wp !! int m Nc^2 [kg]
    end type rod_integrals
 
 contains
@@ -36,19 +41,28 @@ contains
       shape_beta = -(s**2/length)*(1.0_wp - s/length)
    end function shape_beta
 
+   !> Nc(s) = 16 (s/l)^2 (1 - s/l)^2: the bubble, 1 in the middle, without deflection and slope at both ends [1].
+   elemental real(wp) function shape_bubble(s, length)
+      real(wp), intent(in) :: s      !! arc length from the inner node [m]
+      real(wp), intent(in) :: length !! l [m]
+      shape_bubble = 16.0_wp*((s/length)*(1.0_wp - s/length))**2
+   end function shape_bubble
+
    !> All integrals of a rod by a Gauss rule. The mass per length may vary along the rod: it is given at the
-   !> points of the rule. A constant one needs 4 points (Na^2 has degree 6).
+   !> points of the rule. A constant one needs 4 points (Na^2 has degree 6),
+   !> or 5 with the bubble (Nc^2 has degree 8).
    pure function new_rod_integrals(length, mass_per_length, rule) result(integrals)
       real(wp), intent(in) :: length             !! l [m]
       real(wp), intent(in) :: mass_per_length(:) !! m at s = l*rule%points (points) [kg/m]
       type(gauss_rule), intent(in) :: rule       !! on [0, 1]
       type(rod_integrals) :: integrals
-      real(wp), dimension(size(rule%points)) :: s, dm, na, nb
+      real(wp), dimension(size(rule%points)) :: s, dm, na, nb, nc
 
       s = length*rule%points
       dm = length*rule%weights*mass_per_length
       na = shape_alpha(s, length)
       nb = shape_beta(s, length)
+      nc = shape_bubble(s, length)
       integrals%m0 = sum(dm)
       integrals%m1 = sum(dm*s)
       integrals%m2 = sum(dm*s**2)
@@ -59,6 +73,28 @@ contains
       integrals%aa = sum(dm*na**2)
       integrals%ab = sum(dm*na*nb)
       integrals%bb = sum(dm*nb**2)
+      integrals%c1 = sum(dm*nc)
+      integrals%sc = sum(dm*s*nc)
+      integrals%ac = sum(dm*na*nc)
+      integrals%bc = sum(dm*nb*nc)
+      integrals%cc = sum(dm*nc**2)
    end function new_rod_integrals
+
+   !> int EI N'' Nc'' for N = Na, Nb [N] and Nc [N/m], by a Gauss rule. A constant EI couples the bubble with nothing:
+   !> integrated twice by parts, Nc'' against a linear function leaves only what Nc is at the ends.
+   pure function bubble_stiffness(length, bending_stiffness, rule) result(integrals)
+      real(wp), intent(in) :: length               !! l [m]
+      real(wp), intent(in) :: bending_stiffness(:) !! EI at s = l*rule%points (points) [N m^2]
+      type(gauss_rule), intent(in) :: rule         !! on [0, 1]
+      real(wp) :: integrals(3)
+      real(wp), dimension(size(rule%points)) :: bent
+
+      associate (x => rule%points)
+         bent = length*rule%weights*bending_stiffness*32.0_wp/length**2*(1.0_wp - 6.0_wp*x + 6.0_wp*x**2)
+         integrals(1) = sum(bent*(6.0_wp*x - 4.0_wp)/length)
+         integrals(2) = sum(bent*(6.0_wp*x - 2.0_wp)/length)
+         integrals(3) = sum(bent*32.0_wp/length**2*(1.0_wp - 6.0_wp*x + 6.0_wp*x**2))
+      end associate
+   end function bubble_stiffness
 
 end module rodyn_rod_integrals

@@ -3,13 +3,15 @@
 !> `new_scene` turns a case into constants that the kernels read: integrals once per distinct rod, what may be
 !> skipped, and where each unknown stands. Coordinates and rates are vectors in the article's order,
 !>     q = (u_x, u_y, theta, phi, alpha, beta),   p = (Vx, Vy, w, phi', alpha', beta'),
-!> without the first three on a fixed spacecraft and without the last two groups unless bending is dynamic.
+!> without the first three on a fixed spacecraft and without the last two groups unless bending is dynamic. A third bending
+!> shape adds the bubbles behind beta.
 module rodyn_scene
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type, raise, exit_bad_input
    use rodyn_case_config, only: case_config
    use rodyn_quadrature, only: gauss_rule, new_gauss_rule
    use rodyn_rod_constants, only: rod_constants, new_rod_constants
+   use rodyn_bending_matrices, only: bending_matrices, new_bending_matrices, most_shapes
    use rodyn_spacecraft, only: spacecraft_body
    use rodyn_hinge_law, only: hinge_law, new_hinge_law
    use rodyn_loads, only: load_set, new_load_set
@@ -24,7 +26,8 @@ module rodyn_scene
       integer :: n_base = 3  !! unknowns of the spacecraft: 3, or 0 when it is fixed
       integer :: n_dof = 0   !! length of p
       integer :: n_q = 0     !! length of q: n_dof, and the rotations of relaxing hinges behind (`rodyn_hinge_law`)
-      logical :: dynamic_bending = .true. !! alpha and beta are unknowns
+      integer :: n_bend = 2  !! bending coordinates of a rod: 0, 2 (alpha, beta) or 3 (and the bubble)
+      logical :: dynamic_bending = .true. !! n_bend > 0: alpha and beta are unknowns
       logical :: quasistatic = .false.    !! alpha and beta follow from the hinge moments
       logical :: lumped = .false.         !! all mass in the nodes
       logical :: consistent = .true.      !! second-order inertia terms kept
@@ -32,6 +35,7 @@ module rodyn_scene
       type(spacecraft_body) :: body
       real(wp), allocatable :: node_mass(:)    !! (0:n) [kg]; node 0 and the halves of rods only when lumped
       type(rod_constants), allocatable :: rods(:) !! the distinct rods
+      type(bending_matrices), allocatable :: bending(:) !! their matrices over the bending coordinates
       integer, allocatable :: rod_of(:)        !! which of them is rod k (1:n)
       type(hinge_law) :: hinges
       type(load_set) :: loads
@@ -41,6 +45,8 @@ module rodyn_scene
       procedure :: phi_at
       procedure :: alpha_at
       procedure :: beta_at
+      procedure :: bend_at
+      procedure :: bends
       procedure :: rod
    end type scene_type
 
@@ -63,6 +69,27 @@ contains
       class(scene_type), intent(in) :: self
       beta_at = self%n_base + 2*self%n
    end function beta_at
+
+   !> Index in q or p before bending coordinate i: alpha, beta, bubble.
+   elemental integer function bend_at(self, i)
+      class(scene_type), intent(in) :: self
+      integer, intent(in) :: i
+      bend_at = self%n_base + i*self%n
+   end function bend_at
+
+   !> Bending coordinates of rod k (or their rates, or accelerations), zeros behind the last.
+   pure function bends(self, k, q) result(x)
+      class(scene_type), intent(in) :: self
+      integer, intent(in) :: k
+      real(wp), intent(in) :: q(:) !! (n_q) or (n_dof)
+      real(wp) :: x(most_shapes)
+      integer :: i
+
+      x = 0.0_wp
+      do i = 1, self%n_bend
+         x(i) = q(self%n_base + i*self%n + k)
+      end do
+   end function bends
 
    !> Constants of rod k.
    elemental function rod(self, k)
@@ -87,7 +114,8 @@ contains
       scene%lumped = config%model%inertia == 'lumped'
       scene%consistent = config%model%formulation == 'consistent'
       scene%assembled = config%model%kernel == 'assembled'
-      scene%n_dof = scene%n_base + merge(3, 1, scene%dynamic_bending)*scene%n
+      scene%n_bend = merge(config%model%bending_shapes, 0, scene%dynamic_bending)
+      scene%n_dof = scene%n_base + (1 + scene%n_bend)*scene%n
       associate (craft => config%spacecraft)
          scene%body = spacecraft_body(craft%mass, craft%inertia, craft%hinge_x, craft%hinge_y)
       end associate
@@ -133,6 +161,13 @@ contains
                        "(rods without inertia have no bending motion of their own)", exit_bad_input)
          if (model%bending == 'quasistatic' .and. model%inertia == 'distributed') &
             call raise(error, "&model: bending = 'quasistatic' needs inertia = 'lumped'", exit_bad_input)
+         if (model%bending_shapes == 3 .and. model%bending /= 'dynamic') &
+            call raise(error, "&model: bending_shapes = 3 needs bending = 'dynamic'", exit_bad_input)
+         if (model%bending_shapes == 3 .and. model%gauss_points < 5) &
+            call raise(error, "&model: bending_shapes = 3 needs gauss_points = 5 or more (the square of the third shape has "// &
+                       "degree 8)", exit_bad_input)
+         if (model%bending_shapes /= 2 .and. model%bending_shapes /= 3) &
+            call raise(error, "&model: bending_shapes must be 2 or 3", exit_bad_input)
       end associate
    end subroutine check_combination
 
@@ -151,7 +186,7 @@ contains
       call find_distinct(config, scene%rod_of, first)
       n_distinct = size(first)
       call new_gauss_rule(rule, config%model%gauss_points)
-      allocate (rods(n_distinct))
+      allocate (rods(n_distinct), scene%bending(n_distinct))
       do j = 1, n_distinct
          associate (k => first(j), chain => config%chain)
             call new_rod_constants(rods(j), chain%length(k), chain%mass_per_length(k), stiffness_of(k), rule, &
@@ -162,6 +197,7 @@ contains
                           'mass_per_length > 0 and gauss_points >= 2', exit_bad_input)
                return
             end if
+            scene%bending(j) = new_bending_matrices(rods(j), scene%n_bend, scene%consistent)
          end associate
       end do
       call move_alloc(rods, scene%rods)

@@ -32,7 +32,8 @@ module rodyn_sweep_case
    !> Sizes that all cases of a sweep have in common.
    type :: case_shape
       integer :: n_rods = 0   !! of the longest chain; shorter ones end in NaN
-      integer :: n_states = 0 !! 6 n_rods + 6: phi, alpha, beta, their rates, then velocity, displacement and rotation
+      integer :: n_per_rod = 6 !! phi, alpha, beta, their rates; 8: and bubble and its rate, if some case has them
+      integer :: n_states = 0 !! n_per_rod n_rods + 6: those, then velocity, displacement and rotation
       integer :: n_probes = 0
       integer :: n_rows = 0   !! of the longest series; 0: no series are kept
       logical :: outputs = .false. !! the states at the n_outputs times are made, whether they are kept or not
@@ -102,19 +103,22 @@ contains
       integer :: a, n_outputs
 
       shape%n_rods = sweep%base_case%chain%n_rods
+      if (sweep%base_case%model%bending_shapes == 3) shape%n_per_rod = 8
       n_outputs = sweep%base_case%n_outputs
       shape%outputs = sweep%keep_series
       do a = 1, size(sweep%axes)
          select case (sweep%axes(a)%key)
          case ('chain.n_rods')
             shape%n_rods = nint(maxval(sweep%axes(a)%numbers))
+         case ('model.bending_shapes')
+            if (nint(maxval(sweep%axes(a)%numbers)) == 3) shape%n_per_rod = 8
          case ('case.n_outputs')
             n_outputs = nint(maxval(sweep%axes(a)%numbers))
             shape%outputs = .true.
          case default ! changes no size
          end select
       end do
-      shape%n_states = 6*shape%n_rods + 6
+      shape%n_states = shape%n_per_rod*shape%n_rods + 6
       shape%n_probes = size(sweep%probe_times)
       if (sweep%keep_series) shape%n_rows = n_outputs + 1
    end subroutine new_case_shape
@@ -389,7 +393,7 @@ contains
       type(run_row), intent(in) :: row
       integer, intent(in) :: n_rods
       real(wp), intent(inout) :: state(:) !! (n_states); what the row has not is left as it is
-      integer :: n
+      integer :: last, n
 
       n = size(row%phi)
       state(1:n) = row%phi
@@ -398,8 +402,13 @@ contains
       state(3*n_rods + 1:3*n_rods + n) = row%phi_rate
       state(4*n_rods + 1:4*n_rods + n) = row%alpha_rate
       state(5*n_rods + 1:5*n_rods + n) = row%beta_rate
-      state(6*n_rods + 1:) = [row%velocity_x, row%velocity_y, row%omega, &
-                              row%displacement_x, row%displacement_y, row%rotation]
+      last = size(state) - 6
+      if (last == 8*n_rods) then
+         state(6*n_rods + 1:6*n_rods + n) = row%bubble
+         state(7*n_rods + 1:7*n_rods + n) = row%bubble_rate
+      end if
+      state(last + 1:) = [row%velocity_x, row%velocity_y, row%omega, &
+                          row%displacement_x, row%displacement_y, row%rotation]
    end subroutine place
 
    !> Nothing: the sweep has a progress of its own.

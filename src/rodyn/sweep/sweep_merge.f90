@@ -10,8 +10,8 @@ module rodyn_sweep_merge
    use rodyn_hdf5_files, only: hdf5_file, hdf5_version
    use rodyn_integrators, only: sundials_version
    use rodyn_posix, only: ignore_file_size_signal, path_exists, remove_file, sync_path
-   use rodyn_run_layout, only: i_alpha, i_alpha_rate, i_beta, i_beta_rate, i_displacement_x, i_displacement_y, i_omega, &
-      i_phi, i_phi_rate, i_rotation, i_velocity_x, i_velocity_y, run_variables
+   use rodyn_run_layout, only: i_alpha, i_alpha_rate, i_beta, i_beta_rate, i_bubble, i_bubble_rate, i_displacement_x, &
+      i_displacement_y, i_omega, i_phi, i_phi_rate, i_rotation, i_velocity_x, i_velocity_y, run_variables
    use rodyn_sweep_case, only: case_result, case_shape, status_done
    use rodyn_sweep_config, only: sweep_config
    use rodyn_sweep_index, only: sweep_index
@@ -21,7 +21,8 @@ module rodyn_sweep_merge
    private
    public :: merge_sweep
 
-   integer, parameter :: per_rod(6) = [i_phi, i_alpha, i_beta, i_phi_rate, i_alpha_rate, i_beta_rate]
+   integer, parameter :: per_rod(8) = [i_phi, i_alpha, i_beta, i_phi_rate, i_alpha_rate, i_beta_rate, i_bubble, &
+                                    i_bubble_rate] !! the first `case_shape%n_per_rod` of these
    integer, parameter :: scalars(6) = [i_velocity_x, i_velocity_y, i_omega, i_displacement_x, i_displacement_y, i_rotation]
    integer, parameter :: block_bytes = 4*1024*1024 !! memory for the states of a block of cases
    integer, parameter :: most_block_cases = 4096
@@ -227,7 +228,7 @@ contains
       call make('n_rhs', [integer ::], 'integer', '1', 'right-hand sides')
       call make('same_as', [integer ::], 'integer', '1', 'first case with the same values, the one that was computed')
       call make('wall_seconds', [integer ::], 'real', 's', 'wall time of the case')
-      do i = 1, size(per_rod)
+      do i = 1, shape%n_per_rod
          call make_state(per_rod(i), [shape%n_rods])
       end do
       do i = 1, size(scalars)
@@ -298,7 +299,7 @@ contains
          if (.not. allocated(error)) call file%append('n_rhs', block%n_rhs(:n), error)
          if (.not. allocated(error)) call file%append('same_as', block%same_as(:n), error)
          if (.not. allocated(error)) call file%append('wall_seconds', block%wall_seconds(:n), error)
-         do i = 1, size(per_rod)
+         do i = 1, shape%n_per_rod
             first = (i - 1)*rods + 1
             last = i*rods
             name = trim(run_variables(per_rod(i))%name)
@@ -311,7 +312,7 @@ contains
             if (.not. allocated(error)) call file%append('series_'//name, part_3, error)
          end do
          do i = 1, size(scalars)
-            first = 6*rods + i
+            first = shape%n_per_rod*rods + i
             name = trim(run_variables(scalars(i))%name)
             part_2 = block%probes(first, :, :n)
             if (.not. allocated(error)) call file%append(name, part_2, error)
@@ -373,7 +374,7 @@ contains
       do a = 1, size(sweep%axes)
          call attach('param_'//trim(sweep%axes(a)%key), 1, 'case')
       end do
-      do i = 1, size(per_rod)
+      do i = 1, shape%n_per_rod
          call attach_state(trim(run_variables(per_rod(i))%name), 1)
       end do
       do i = 1, size(scalars)

@@ -177,7 +177,7 @@ contains
    pure logical function changes_kind(axis)
       type(sweep_axis), intent(in) :: axis
       changes_kind = axis%textual .or. axis%key == 'chain.n_rods' .or. axis%key == 'solver.order' .or. &
-                     axis%key == 'solver.fixed_step'
+                     axis%key == 'model.bending_shapes' .or. axis%key == 'solver.fixed_step'
    end function changes_kind
 
    !> All that results depend on, one line each: what a resumed sweep must have in common with the first.
