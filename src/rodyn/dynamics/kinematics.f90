@@ -3,7 +3,7 @@ module rodyn_kinematics
    use rodyn_kinds, only: wp
    use rodyn_scene, only: scene_type
    use rodyn_bending_matrices, only: most_shapes
-   use rodyn_hinge_law, only: hinge_state, hinge_rates, spring_energy, openings
+   use rodyn_hinge_law, only: hinge_state, hinge_rates, spring_energy
    use rodyn_three_moments, only: slopes_from_moments
    implicit none (type, external)
    private
