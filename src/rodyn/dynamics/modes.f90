@@ -145,9 +145,69 @@ contains
       if (reduced%nw == 1) reduced%asymmetry = max(reduced%asymmetry, maxval(abs(reduced%k(1, :))))
       reduced%asymmetry = reduced%asymmetry/max(maxval(abs(kc)), tiny(1.0_wp))
       kc = 0.5_wp*(kc + transpose(kc))
-      call undamped_modes(kc, mc, reduced%omega_2, error)
-      call move_alloc(kc, reduced%basis)
+      reduced%basis = kc
+      call undamped_modes(reduced%basis, mc, reduced%omega_2, error)
+      if (.not. allocated(error)) call polish_modes(kc, reduced%basis, reduced%omega_2)
    end subroutine reduce
+
+   !> Give slow modes beside fast ones their digits back. dsygvd is off by epsilon times the largest omega^2, which mixes modes
+   !> that are slow against it with each other; their own stiffness x^T K x has no such error, since what is slow has much
+   !> mass and so small x. Rotations by Jacobi make it diagonal, each element to rounding of the two beside it.
+   subroutine polish_modes(k, basis, omega_2)
+      real(wp), intent(in) :: k(:, :)        !! symmetric
+      real(wp), intent(inout) :: basis(:, :) !! M-orthonormal
+      real(wp), intent(inout) :: omega_2(:)  !! rising
+      integer, parameter :: most_sweeps = 20
+      real(wp), parameter :: negligible = 10.0_wp*epsilon(1.0_wp)
+      real(wp), allocatable :: h(:, :)
+      integer, allocatable :: order(:)
+      integer :: i, j, sweep
+      logical :: done
+
+      h = matmul(transpose(basis), matmul(k, basis))
+      do sweep = 1, most_sweeps
+         done = .true.
+         do j = 2, size(h, 1)
+            do i = 1, j - 1
+               if (abs(h(i, j)) <= negligible*sqrt(abs(h(i, i)))*sqrt(abs(h(j, j)))) cycle
+               if (abs(h(i, j)) <= tiny(1.0_wp)) cycle
+               done = .false.
+               call rotate(h, basis, i, j)
+            end do
+         end do
+         if (done) exit
+      end do
+      omega_2 = [(h(i, i), i=1, size(h, 1))]
+      order = rising_order(omega_2)
+      omega_2 = omega_2(order)
+      basis = basis(:, order)
+   end subroutine polish_modes
+
+   !> Make h(i, j) zero.
+   pure subroutine rotate(h, basis, i, j)
+      real(wp), intent(inout) :: h(:, :), basis(:, :)
+      integer, intent(in) :: i, j
+      real(wp) :: theta, t, c, s, before
+      integer :: m
+
+      theta = 0.5_wp*(h(j, j) - h(i, i))/h(i, j)
+      t = sign(1.0_wp, theta)/(abs(theta) + hypot(1.0_wp, theta))
+      c = 1.0_wp/hypot(1.0_wp, t)
+      s = t*c
+      do m = 1, size(h, 1)
+         before = h(m, i)
+         h(m, i) = c*before - s*h(m, j)
+         h(m, j) = s*before + c*h(m, j)
+         before = basis(m, i)
+         basis(m, i) = c*before - s*basis(m, j)
+         basis(m, j) = s*before + c*basis(m, j)
+      end do
+      do m = 1, size(h, 1)
+         before = h(i, m)
+         h(i, m) = c*before - s*h(j, m)
+         h(j, m) = s*before + c*h(j, m)
+      end do
+   end subroutine rotate
 
    !> K x = omega^2 M x: vectors take the place of K.
    subroutine undamped_modes(k, m, omega_2, error)
