@@ -118,10 +118,10 @@ contains
       config%profiles%quantity = 'mass_per_length'
       config%profiles(2:3)%quantity = 'bending_stiffness'
       config%profiles(1)%polynomial = [1.0_wp, -1.2_wp, 0.7_wp]
-      config%profiles(2)%polynomial = [3.0_wp, -1.5_wp]
+      config%profiles(2)%polynomial = [1.5_wp, -0.5_wp]
       do i = 3, 4
          config%profiles(i)%positions = [0.0_wp, 0.3_wp, 0.3_wp, 1.0_wp]
-         config%profiles(i)%values = [1.5_wp, 1.0_wp, 2.4_wp, 1.8_wp]
+         config%profiles(i)%values = [1.2_wp, 1.0_wp, 1.5_wp, 1.4_wp]
       end do
    end subroutine vary_rods
 

@@ -147,7 +147,7 @@ contains
       do k = 1, scene%n
          associate (s => scene%rods(scene%rod_of(k))%stiffness, carry => scene%rods(scene%rod_of(k))%carry_over)
             elastic_energy = elastic_energy + 0.5_wp*s(1)* &
-                             (alpha(k)**2 + 2.0_wp*carry(1)*alpha(k)*beta(k) + s(3)/s(1)*beta(k)**2)
+                             (alpha(k)**2 + (2.0_wp*carry(1)*alpha(k))*beta(k) + (s(3)/s(1)*beta(k))*beta(k))
          end associate
       end do
    end function elastic_energy

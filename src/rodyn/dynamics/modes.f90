@@ -317,11 +317,11 @@ contains
       call first_order_matrix(a, scale, model, reduced)
       call eigen(a, with_shapes, re, im, vectors, error)
       if (allocated(error)) return
-      ! Zeros that must be there: the spin if angular momentum stays, and folding at hinges without spring.
+      ! Zeros that must be there: the spin if angular momentum stays or nothing feels it, and folding at hinges without spring.
       n_rigid = 2*reduced%nw
       n_zero = 0
       n_known = 0
-      if (model%is_steady(modes%fastest) .and. .not. model%loaded .and. reduced%nw == 1) then
+      if (keeps_spin()) then
          n_rigid = 3
          n_known = 1
       end if
@@ -346,6 +346,17 @@ contains
             modes%shape(:, n_rigid + n_zero + i) = moving_shape(model, reduced, scale, eigenvalue(i), vector)
          end associate
       end do
+
+   contains
+
+      !> Does a change of the spin stay as it is?
+      logical function keeps_spin()
+         keeps_spin = .false.
+         if (reduced%nw == 0) return
+         keeps_spin = (model%is_steady(modes%fastest) .and. .not. model%loaded) .or. &
+                      maxval(abs(reduced%c(:, 1))) <= 1.0e3_wp*epsilon(1.0_wp)*maxval(abs(model%mass))*maxval(abs(model%p(1:2)))
+      end function keeps_spin
+
    end subroutine general_modes
 
    !> d/dt (scale eta, th, spin, eta') = A (...), spin = sqrt(inertia) (w + follow . x'), x = basis eta.

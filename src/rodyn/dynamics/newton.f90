@@ -158,8 +158,8 @@ contains
          end do
          do k = 1, n
             associate (f => law%series%flexibility(:, k))
-               self%opening(k - 1) = self%opening(k - 1) + f(1)*pull(k - 1) + f(2)*pull(k)
-               if (k < n) self%opening(k) = self%opening(k) + f(2)*pull(k - 1) + f(3)*pull(k)
+               self%opening(k - 1) = self%opening(k - 1) + f(2)*(f(1)/f(2)*pull(k - 1) + pull(k))
+               if (k < n) self%opening(k) = self%opening(k) + f(2)*(pull(k - 1) + f(3)/f(2)*pull(k))
             end associate
          end do
          call self%balance%solve(self%opening)

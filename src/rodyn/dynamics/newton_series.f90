@@ -26,6 +26,7 @@ module rodyn_newton_series
       real(wp) :: force(2, 5)   !! fe, fn by the unknowns
       real(wp) :: stiffness     !! C of hinge k - 1
       real(wp) :: slope(3), bend(3) !! f, f/g^2
+      real(wp) :: outer_ratio   !! f22/f12
    end type series_factor
 
 contains
@@ -86,7 +87,10 @@ contains
       real(wp) :: answer(4, 5), spring
       integer :: j
 
-      f%slope = rod%flexibility
+      associate (k => rod%stiffness) ! f is its inverse; f12 factored out
+         f%outer_ratio = k(1)/k(2)
+         f%slope = [k(3)/k(2), 1.0_wp, f%outer_ratio]/(k(1)*(k(3)/k(2)) - k(2))
+      end associate
       f%bend = f%slope/gamma**2
       spring = gamma**2*f%stiffness
       answer(:, 1) = p(:, 1)*f%ae_phi + p(:, 2)*f%an_phi + p(:, 3) + p(:, 4)
@@ -227,8 +231,8 @@ contains
             inner(1) = inner(1) - length*(2.0_wp*t%w*(d_omega + phi_rate(k)) + t%wr*phi(k)) + f%ae_w*omega_rate + &
                        f%ae_phi*left(1, k)
             inner(2) = inner(2) - length*t%w**2*phi(k) + length*omega_rate + f%an_phi*left(1, k)
-            inner(3) = left(1, k) + f%bend(2)*left(3, k) + f%bend(3)*left(4, k)
-            inner(4) = left(1, k) + f%slope(2)*f%stiffness*left(2, k) + f%slope(3)*left(5, k)
+            inner(3) = left(1, k) + f%bend(2)*(left(3, k) + f%outer_ratio*left(4, k))
+            inner(4) = left(1, k) + f%slope(2)*(f%stiffness*left(2, k) + f%outer_ratio*left(5, k))
          end associate
       end do
    end subroutine expand_series

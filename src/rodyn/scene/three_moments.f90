@@ -2,7 +2,8 @@
 !>
 !> A massless rod with end moments -T_{k-1}, +T_k bends by
 !>     alpha_k = -(f11 T_{k-1} + f12 T_k),   beta_k = f12 T_{k-1} + f22 T_k,   T_n = 0
-!> (f of `rodyn_rod_bending`; f11 = f22 = 2 f12 = l/3EI of a uniform rod), so the joint rotations th obey  th_k + beta_k - alpha_{k+1} = opening_k - gamma_k. With T = C th this is
+!> (f of `rodyn_rod_bending`; f11 = f22 = 2 f12 = l/3EI of a uniform rod), so the joint rotations th obey
+!> th_k + beta_k - alpha_{k+1} = opening_k - gamma_k. With T = C th this is
 !>     (I + F C) th = opening - gamma,   F tridiagonal, symmetric, positive definite:
 !> constant, and factored once. A free hinge (C = 0) needs no exception. Where a damper makes the moment T_k the
 !> unknown and th_k a given state, column k is that of T instead: F in place of I + F C.

@@ -37,7 +37,8 @@ module rodyn_sweep_case
    type :: case_shape
       integer :: n_rods = 0   !! of the longest chain; shorter ones end in NaN
       integer :: n_modes = 0  !! natural frequencies that are kept
-      integer :: n_states = 0 !! 0 without integration, otherwise 6 n_rods + 6: phi, alpha, beta, their rates, then velocity, displacement and rotation
+      integer :: n_states = 0 !! 6 n_rods + 6: phi, alpha, beta, their rates, then velocity, displacement and rotation; 0
+                              !! where nothing is integrated
       integer :: n_probes = 0
       integer :: n_rows = 0   !! of the longest series; 0: no series are kept
       logical :: outputs = .false. !! the states at the n_outputs times are made, whether they are kept or not

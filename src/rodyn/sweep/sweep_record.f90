@@ -1,7 +1,8 @@
 !> The result of a case as a run of 64-bit words that proves itself.
 !>
 !> Record: length in words; case; status; attempt; n_steps; n_rhs; t_reached; wall and integration seconds; bytes of the
-!> message; the message; if the case is done, frequencies, damping ratios, final state, probes, times and series; CRC-64 of all before it.
+!> message; the message; if the case is done, frequencies, damping ratios, final state, probes, times and series; CRC-64 of all
+!> before it.
 module rodyn_sweep_record
    use rodyn_kinds, only: wp, i8
    use rodyn_checksum, only: crc64
