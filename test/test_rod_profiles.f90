@@ -37,7 +37,8 @@ contains
          new_test('rods of equal profiles share their constants', shared_constants), &
          new_test('the least value of a polynomial is found between the ends', least_value), &
          new_test('frequencies of wedge and cone are the published ones', tapered_cantilevers), &
-         new_test('a varying case reads back from its resolved form', reads_back)]
+         new_test('a varying case reads back from its resolved form', reads_back), &
+         new_test('faults of profiles are told with their reason', faults_told)]
    end subroutine collect_rod_profiles
 
    function polynomial(c) result(profile)
@@ -323,6 +324,47 @@ contains
       end function power_of_taper
 
    end subroutine lowest_frequencies
+
+   subroutine faults_told(error)
+      type(error_type), allocatable, intent(out) :: error
+      character(len=*), parameter :: ei = "quantity = 'bending_stiffness', ", m = "quantity = 'mass_per_length', "
+
+      call expect(m//'polynomial = 1, -2', 'polynomial = 1, -2: must not be negative anywhere from 0 to 1, but goes down to -1.')
+      if (.not. allocated(error)) call expect(m//'polynomial = 1, last_rod = 4', &
+                                              'last_rod = 4: there is no such rod; they are numbered 1..3')
+      if (.not. allocated(error)) call expect(m//'polynomial = 1, first_rod = 3, last_rod = 2', &
+                                              'last_rod = 2: must not be less than first_rod = 3')
+      if (.not. allocated(error)) call expect(m//'positions = 0, 1', 'values: is required with positions')
+      if (.not. allocated(error)) call expect(m//'positions = 0, 1, values = 1, 2, 3', &
+                                              'values = 1, 2, 3: must be as many as positions: 2, not 3')
+      if (.not. allocated(error)) call expect(m//'positions = 0, 0.5, values = 1, 2', &
+                                              'positions = 0, 0.5: must begin with 0 and end with 1')
+      if (.not. allocated(error)) call expect(m//'positions = 0, 0.5, 0.4, 1, values = 4*1', 'must rise; two equal ones make')
+      if (.not. allocated(error)) call expect(m, 'polynomial: is required unless positions and values are given')
+      if (.not. allocated(error)) call expect(m//'polynomial = 1, positions = 0, 1, values = 1, 2', &
+                                              'polynomial = 1: does not go with positions and values')
+      if (.not. allocated(error)) call expect(ei//'polynomial = 0', 'polynomial = 0: must not be zero everywhere')
+      if (.not. allocated(error)) call expect(ei//"polynomial = 1, -1 / &model inertia = 'lumped', bending = 'quasistatic'", &
+                                              "must be positive from 0 to 1 when bending = 'quasistatic'")
+
+   contains
+
+      subroutine expect(group, message)
+         character(len=*), intent(in) :: group, message
+         type(error_type), allocatable :: fault
+         type(case_config) :: config
+         character(len=1), parameter :: nl = new_line('a')
+
+         call parse_case('&spacecraft mass = 1, inertia = 1 /'//nl// &
+                         '&chain n_rods = 3, length = 1, mass_per_length = 1, bending_stiffness = 1, hinge_stiffness = 1 /'// &
+                         nl//'&rod_profile '//group//' /'//nl, 'c.nml', config, fault)
+         call check(error, allocated(fault), 'accepted: '//group)
+         if (allocated(error)) return
+         call check(error, index(fault%message, 'c.nml:3: &rod_profile ') == 1 .and. index(fault%message, message) > 0, &
+                    fault%message)
+      end subroutine expect
+
+   end subroutine faults_told
 
    subroutine reads_back(error)
       type(error_type), allocatable, intent(out) :: error

@@ -37,6 +37,7 @@ module rodyn_modes
    contains
       procedure :: frequency
       procedure :: damping_ratio
+      procedure :: decay
       procedure :: is_stable
       procedure :: oscillations
    end type mode_set
@@ -66,8 +67,15 @@ contains
       class(mode_set), intent(in) :: self
       real(wp) :: zeta(self%n)
       zeta = 0.0_wp
-      where (abs(self%eigenvalue) > 0.0_wp) zeta = -real(self%eigenvalue, wp)/abs(self%eigenvalue)
+      where (abs(self%eigenvalue) > 0.0_wp) zeta = (0.0_wp - real(self%eigenvalue, wp))/abs(self%eigenvalue)
    end function damping_ratio
+
+   !> Rates of decay [1/s].
+   pure function decay(self)
+      class(mode_set), intent(in) :: self
+      real(wp) :: decay(self%n)
+      decay = 0.0_wp - real(self%eigenvalue, wp) ! no negative zeros
+   end function decay
 
    !> Does no mode grow, beyond rounding?
    elemental logical function is_stable(self, i)

@@ -84,7 +84,7 @@ contains
          call per_mode('frequency_hz', modes%frequency()/(2.0_wp*pi), 'Hz', 'natural frequency in cycles')
          call per_mode('frequency_damped', aimag(modes%eigenvalue), 'rad s-1', 'frequency of the motion, imaginary part')
          call per_mode('damping_ratio', modes%damping_ratio(), '1', 'decay over natural frequency; -1 or 1 of relaxations')
-         call per_mode('decay', -real(modes%eigenvalue, wp), 's-1', 'rate of decay, minus the real part; negative: it grows')
+         call per_mode('decay', modes%decay(), 's-1', 'rate of decay, minus the real part; negative: it grows')
          if (allocated(error)) return
          call file%file%create_series('kind', [integer ::], modes%n, compression, error, 'text')
          if (.not. allocated(error)) call file%file%append('kind', modes%kind, error)

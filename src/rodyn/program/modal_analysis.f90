@@ -86,21 +86,22 @@ contains
    !> One line for each mode, as far as there is room.
    subroutine print_table(modes)
       type(mode_set), intent(in) :: modes
-      real(wp) :: frequency(modes%n), ratio(modes%n)
+      real(wp), dimension(modes%n) :: frequency, ratio, decay
       character(len=120) :: line
       integer :: i
 
       frequency = modes%frequency()
       ratio = modes%damping_ratio()
+      decay = modes%decay()
       write (output_unit, '(a)') '  mode   frequency, rad/s   frequency, Hz   damping ratio      decay, 1/s   kind'
       do i = 1, min(modes%n, most_rows)
          if (modes%kind(i) == rigid_body .or. modes%kind(i) == mechanism) then
             write (line, '(i6, f19.6, f16.6, 35x, a)') i, 0.0_wp, 0.0_wp, modes%kind(i)
          else if (modes%kind(i) == relaxation) then
-            write (line, '(i6, 51x, es16.6, 3x, a)') i, -real(modes%eigenvalue(i), wp), modes%kind(i)
+            write (line, '(i6, 51x, es16.6, 3x, a)') i, decay(i), modes%kind(i)
          else
             write (line, '(i6, f19.6, f16.6, 2es16.6, 3x, a)') i, frequency(i), frequency(i)/(2.0_wp*pi), ratio(i), &
-               -real(modes%eigenvalue(i), wp), modes%kind(i)
+               decay(i), modes%kind(i)
          end if
          if (.not. modes%is_stable(i)) line = trim(line)//', growing'
          write (output_unit, '(a)') trim(line)
