@@ -91,7 +91,7 @@ contains
    subroutine soften(scene, b)
       type(scene_type), intent(in) :: scene
       real(wp), intent(inout) :: b(0:, :)
-      real(wp) :: g(0:scene%n - 1, 0:scene%n - 1), slope
+      real(wp) :: g(0:scene%n - 1, 0:scene%n - 1)
       integer :: pivots(scene%n), info, k
 
       g = 0.0_wp
@@ -100,20 +100,19 @@ contains
       end do
       associate (c => scene%hinges%stiffness)
          do k = 1, scene%n
-            associate (rod => scene%rods(scene%rod_of(k)))
-               slope = rod%length/(6.0_wp*rod%bending_stiffness)
+            associate (f => scene%rods(scene%rod_of(k))%flexibility)
+               g(k - 1, k - 1) = g(k - 1, k - 1) + f(1)*c(k - 1)
+               if (k == scene%n) cycle
+               g(k, k) = g(k, k) + f(3)*c(k)
+               g(k - 1, k) = f(2)*c(k)
+               g(k, k - 1) = f(2)*c(k - 1)
             end associate
-            g(k - 1, k - 1) = g(k - 1, k - 1) + 2.0_wp*slope*c(k - 1)
-            if (k == scene%n) cycle
-            g(k, k) = g(k, k) + 2.0_wp*slope*c(k)
-            g(k - 1, k) = slope*c(k)
-            g(k, k - 1) = slope*c(k - 1)
          end do
       end associate
       call dgesv(scene%n, scene%n_dof, g, scene%n, pivots, b, scene%n, info)
    end subroutine soften
 
-   !> Bending stiffness of the rods: (2 EI/l)((2, 1), (1, 2)) on (alpha, beta).
+   !> Bending stiffness of the rods on (alpha, beta).
    subroutine add_bending(scene, stiffness)
       type(scene_type), intent(in) :: scene
       real(wp), intent(inout) :: stiffness(:, :)
@@ -122,11 +121,11 @@ contains
       do k = 1, scene%n
          a = scene%alpha_at() + k
          b = scene%beta_at() + k
-         associate (kappa => scene%rods(scene%rod_of(k))%kappa)
-            stiffness(a, a) = stiffness(a, a) + 2.0_wp*kappa
-            stiffness(b, b) = stiffness(b, b) + 2.0_wp*kappa
-            stiffness(a, b) = stiffness(a, b) + kappa
-            stiffness(b, a) = stiffness(b, a) + kappa
+         associate (rod => scene%rods(scene%rod_of(k)))
+            stiffness(a, a) = stiffness(a, a) + rod%stiffness(1)
+            stiffness(b, b) = stiffness(b, b) + rod%stiffness(3)
+            stiffness(a, b) = stiffness(a, b) + rod%stiffness(2)
+            stiffness(b, a) = stiffness(b, a) + rod%stiffness(2)
          end associate
       end do
    end subroutine add_bending

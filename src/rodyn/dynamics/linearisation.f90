@@ -165,8 +165,8 @@ contains
             dr(f) = dr(f) - d_mv*ae - mv*d_ae + 2.0_wp*wr*dot_product(sx, dx) + 2.0_wp*dw*dot_product(sx, v) + &
                     2.0_wp*w*(dot_product(times(rod%second, dx), v) + dot_product(sx, dv))
             bx = times([i%aa, i%ab, i%bb], 2.0_wp*w*dw*x + w**2*dx)
-            dr(ia) = i%a1*d_an - bx(1) + moment(k - 1) + rod%kappa*(2.0_wp*dx(1) + dx(2))
-            dr(ib) = i%b1*d_an - bx(2) - moment(k) + rod%kappa*(dx(1) + 2.0_wp*dx(2))
+            dr(ia) = i%a1*d_an - bx(1) + moment(k - 1) + rod%stiffness(1)*(dx(1) + rod%carry_over(1)*dx(2))
+            dr(ib) = i%b1*d_an - bx(2) - moment(k) + rod%stiffness(3)*(rod%carry_over(2)*dx(1) + dx(2))
          end if
          force = force + fe*e + fn*n
          d_force = d_force + (d_fe - d_phi*fn)*e + (d_fn + d_phi*fe)*n

@@ -4,7 +4,7 @@ module rodyn_rod_integrals
    use rodyn_quadrature, only: gauss_rule
    implicit none (type, external)
    private
-   public :: rod_integrals, new_rod_integrals, shape_alpha, shape_beta
+   public :: rod_integrals, new_rod_integrals, shape_alpha, shape_beta, curvature_alpha, curvature_beta
 
    !> Integrals over one rod, 0 <= s <= l; m(s) is its mass per length.
    type :: rod_integrals
@@ -35,6 +35,20 @@ contains
       real(wp), intent(in) :: length !! l [m]
       shape_beta = -(s**2/length)*(1.0_wp - s/length)
    end function shape_beta
+
+   !> Na'' = (6 s/l - 4)/l [1/m].
+   elemental real(wp) function curvature_alpha(s, length)
+      real(wp), intent(in) :: s      !! arc length from the inner node [m]
+      real(wp), intent(in) :: length !! l [m]
+      curvature_alpha = (6.0_wp*s/length - 4.0_wp)/length
+   end function curvature_alpha
+
+   !> Nb'' = (6 s/l - 2)/l [1/m].
+   elemental real(wp) function curvature_beta(s, length)
+      real(wp), intent(in) :: s      !! arc length from the inner node [m]
+      real(wp), intent(in) :: length !! l [m]
+      curvature_beta = (6.0_wp*s/length - 2.0_wp)/length
+   end function curvature_beta
 
    !> All integrals of a rod by a Gauss rule. The mass per length may vary along the rod: it is given at the
    !> points of the rule. A constant one needs 4 points (Na^2 has degree 6).
