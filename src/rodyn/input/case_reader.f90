@@ -75,9 +75,10 @@ contains
       call match_document(document, case_groups, case_rows, checked)
       call check_document(checked, case_extents(rods_of(checked)))
       loader%checked => checked
-      allocate (config%loads(instances(checked, 'load')))
+      allocate (config%loads(instances(checked, 'load')), config%profiles(instances(checked, 'rod_profile')))
       call visit_case(loader, config)
       call complete_loads(checked, config)
+      call complete_profiles(checked, config)
       call check_case(checked, config)
       call checked%faults%to_error(document%name, error)
    end subroutine case_from_document
@@ -111,6 +112,17 @@ contains
          end associate
       end do
    end subroutine complete_loads
+
+   !> Profiles reach to the last rod.
+   subroutine complete_profiles(checked, config)
+      type(checked_document), intent(in) :: checked
+      type(case_config), intent(inout) :: config
+      integer :: i
+
+      do i = 1, size(config%profiles)
+         if (entry_of(checked, 'rod_profile', i, 'last_rod') == 0) config%profiles(i)%last_rod = config%chain%n_rods
+      end do
+   end subroutine complete_profiles
 
    !> A complete commented case that runs as it is.
    function default_case() result(text)

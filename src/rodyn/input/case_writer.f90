@@ -41,6 +41,7 @@ contains
 
       copy = config ! a visitor may change what it visits; this one does not
       if (.not. allocated(copy%loads)) allocate (copy%loads(0))
+      if (.not. allocated(copy%profiles)) allocate (copy%profiles(0))
       call visit_case(writer, copy)
       text = writer%text%content()
    end function resolved_case
