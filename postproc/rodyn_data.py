@@ -253,6 +253,42 @@ class Run:
         return int(np.argmin(np.abs(time - t)))
 
 
+class Modes(Run):
+    """One file of `rodyn modes`. Shapes are complex."""
+
+    def __init__(self, path: str | pathlib.Path, file: h5py.File):
+        self.path = pathlib.Path(path)
+        self.file = file
+        for name in ("mode", "phi_real"):
+            if name not in file:
+                raise DataError(f"{path}: is no file of rodyn modes: no data set '{name}'")
+        self.n_rods = file["phi_real"].shape[1]
+        self._scene = None
+
+    def kinds(self) -> list[str]:
+        return texts(self.file["kind"])
+
+    def oscillations(self) -> list[int]:
+        """Where the oscillations stand, the slowest first."""
+        return [i for i, kind in enumerate(self.kinds()) if kind == "oscillation"]
+
+    def index(self, number: int) -> int:
+        """Where mode `number` stands."""
+        if not 1 <= number <= self.file["mode"].size:
+            raise DataError(f"{self.path}: no mode {number}: it has modes 1 to {self.file['mode'].size}")
+        return number - 1
+
+    def shape(self, i: int) -> dict[str, np.ndarray]:
+        """Changes of the coordinates in mode i."""
+        return {name: self.file[f"{name}_real"][i] + 1j * self.file[f"{name}_imag"][i] for name in RATE_OF}
+
+    def state(self) -> dict[str, np.ndarray]:
+        """The coordinates about which the equations were linearised; slopes that follow from moments are left out."""
+        values = dict(zip(texts(self.file["coordinate"]), self.file["state"][()], strict=True))
+        per_rod = {name: np.array([values.get(f"{name}_{k}", 0.0) for k in range(1, self.n_rods + 1)]) for name in ("phi", "alpha", "beta")}
+        return per_rod | {name: np.float64(values.get(name, 0.0)) for name in ("displacement_x", "displacement_y", "rotation")}
+
+
 class Sweep:
     """One sweep file. `axes` maps each axis to its value in every case."""
 
@@ -489,6 +525,12 @@ def opened(path: str | pathlib.Path) -> h5py.File:
 def open_run(path: str | pathlib.Path) -> Iterator[Run]:
     with opened(path) as file:
         yield Run(path, file)
+
+
+@contextmanager
+def open_modes(path: str | pathlib.Path) -> Iterator[Modes]:
+    with opened(path) as file:
+        yield Modes(path, file)
 
 
 @contextmanager

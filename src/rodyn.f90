@@ -13,18 +13,19 @@
 module rodyn
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
-   use rodyn_case_config, only: case_config, load_config
+   use rodyn_case_config, only: case_config, load_config, profile_config
    use rodyn_case_reader, only: read_case, parse_case, resolved_case, default_case
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_motion, only: motion_type, new_motion, initial_state
    use rodyn_frequencies, only: natural_frequencies
    use rodyn_run, only: run_case
    use rodyn_user_load, only: user_load
+   use rodyn_modal_analysis, only: analyse_modes
    use rodyn_build_info, only: program_version
    implicit none (type, external)
    private
    public :: wp, error_type
-   public :: case_config, load_config, read_case, parse_case, resolved_case, default_case, run_case
+   public :: case_config, load_config, profile_config, analyse_modes, read_case, parse_case, resolved_case, default_case, run_case
    public :: scene_type, new_scene, motion_type, new_motion, initial_state, natural_frequencies
    public :: user_load
    public :: program_version

@@ -15,6 +15,7 @@ program tester
    use test_lanes, only: collect_lanes
    use test_locks, only: collect_locks
    use test_method_choice, only: collect_method_choice
+   use test_modes, only: collect_modes
    use test_motion, only: collect_motion
    use test_moving, only: collect_moving
    use test_newton, only: collect_newton
@@ -23,6 +24,7 @@ program tester
    use test_namelist_fuzz, only: collect_namelist_fuzz
    use test_progress, only: collect_progress
    use test_quadrature, only: collect_quadrature
+   use test_rod_profiles, only: collect_rod_profiles
    use test_run_file, only: collect_run_file
    use test_schema, only: collect_schema
    use test_sweep, only: collect_sweep
@@ -43,10 +45,12 @@ program tester
    if (command_argument_count() > 0) call get_command_argument(1, filter)
 
    call run('quadrature', collect_quadrature)
+   call run('rod_profiles', collect_rod_profiles)
    call run('kernels', collect_kernels)
    call run('locks', collect_locks)
    call run('lanes', collect_lanes)
    call run('motion', collect_motion)
+   call run('modes', collect_modes)
    call run('moving', collect_moving)
    call run('newton', collect_newton)
    call run('integrators', collect_integrators)

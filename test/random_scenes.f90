@@ -111,9 +111,29 @@ contains
          if (mod(n, 3) == 0) config%chain%kink(k - 1) = uniform(-0.5_wp, 0.5_wp)
       end do
       if (n > 1) config%chain%length(2) = config%chain%length(1) ! not quite distinct rods
+      if (mod(n, 4) >= 2) call vary_rods(config, n)
       call random_initial(config, n)
       call random_loads(config, n)
    end subroutine random_case
+
+   !> Some rods of a random case vary along their length: by polynomials and by tables with a jump.
+   subroutine vary_rods(config, n)
+      type(case_config), intent(inout) :: config
+      integer, intent(in) :: n
+      integer :: i
+
+      allocate (config%profiles(4))
+      config%profiles%first_rod = [1, 1, max(1, n/2), n]
+      config%profiles%last_rod = [1, n, n, n]
+      config%profiles%quantity = 'mass_per_length'
+      config%profiles(2:3)%quantity = 'bending_stiffness'
+      config%profiles(1)%polynomial = [1.0_wp, -1.2_wp, 0.7_wp]
+      config%profiles(2)%polynomial = [1.5_wp, -0.5_wp]
+      do i = 3, 4
+         config%profiles(i)%positions = [0.0_wp, 0.3_wp, 0.3_wp, 1.0_wp]
+         config%profiles(i)%values = [1.2_wp, 1.0_wp, 1.5_wp, 1.4_wp]
+      end do
+   end subroutine vary_rods
 
    subroutine random_initial(config, n)
       type(case_config), intent(inout) :: config

@@ -187,11 +187,11 @@ contains
       system%k = 0.0_wp
       do k = 1, n
          system%k(k, k) = 1.0_wp
-         associate (a => n + k, b => 2*n + k, kappa => scene%rods(scene%rod_of(k))%kappa)
-            system%k(a, a) = 2.0_wp*kappa
-            system%k(b, b) = 2.0_wp*kappa
-            system%k(a, b) = kappa
-            system%k(b, a) = kappa
+         associate (a => n + k, b => 2*n + k, stiffness => scene%rods(scene%rod_of(k))%stiffness)
+            system%k(a, a) = stiffness(1)
+            system%k(b, b) = stiffness(3)
+            system%k(a, b) = stiffness(2)
+            system%k(b, a) = stiffness(2)
          end associate
       end do
    end subroutine use_joint_rotations

@@ -4,7 +4,7 @@ module test_sweep
    use rodyn_case_config, only: case_config
    use rodyn_checksum, only: crc64, crc64_text, hexadecimal
    use rodyn_errors, only: error_type
-   use rodyn_sweep_case, only: build_case, case_result, case_shape, new_case_shape, status_done
+   use rodyn_sweep_case, only: allocate_result, build_case, case_result, case_shape, new_case_shape, status_done
    use rodyn_sweep_config, only: sweep_config
    use rodyn_sweep_plan, only: new_plan, sweep_plan
    use rodyn_sweep_reader, only: parse_sweep
@@ -128,6 +128,7 @@ contains
       shape%n_rods = 1
       shape%n_states = 12
       shape%n_probes = 2
+      shape%n_modes = 3
       kept%case = 3
       kept%status = status_done
       kept%attempt = 2
@@ -136,6 +137,8 @@ contains
       kept%message = 'nine text'
       kept%final = [(real(i, wp)/3.0_wp, i=1, 12)]
       allocate (kept%probes(12, 2), kept%times(0), kept%series(12, 0))
+      kept%frequency = [1.5_wp, 2.5_wp, 4.0_wp]
+      kept%damping_ratio = 0.01_wp*kept%frequency
       kept%probes(:, 1) = -kept%final
       kept%probes(:, 2) = kept%final**2
    end subroutine sample
@@ -153,13 +156,14 @@ contains
       if (allocated(error)) return
       call check(error, is_sound(words(:used)), 'checksum')
       if (allocated(error)) return
-      allocate (back%final(12), back%probes(12, 2), back%times(0), back%series(12, 0))
+      call allocate_result(back, shape)
       call decode_record(words(:used), shape, back)
       call check(error, back%message, 'nine text', 'message')
       if (allocated(error)) return
       call check(error, back%case == 3 .and. back%attempt == 2 .and. back%n_rhs == 2_i8**40, 'numbers')
       if (allocated(error)) return
-      call check_close(error, [back%final, back%probes(:, 2)], [kept%final, kept%probes(:, 2)], 0.0_wp, 'states')
+      call check_close(error, [back%frequency, back%damping_ratio, back%final, back%probes(:, 2)], &
+                       [kept%frequency, kept%damping_ratio, kept%final, kept%probes(:, 2)], 0.0_wp, 'states')
    end subroutine round_trip
 
    !> A shard of three records, of cases 1, 2 and 3.

@@ -142,7 +142,7 @@ def test_a_report_opens_in_a_browser(runs, sweeps, tmp_path, name):
     assert Page(dom).tags.count("figure") == Page(path.read_text(encoding="utf-8")).tags.count("figure")
 
 
-@pytest.mark.parametrize("name", [*RUN_SCRIPTS, *SWEEP_SCRIPTS, "work_precision", "stiffness", "tables"])
+@pytest.mark.parametrize("name", [*RUN_SCRIPTS, *SWEEP_SCRIPTS, "mode_shapes", "work_precision", "stiffness", "tables"])
 def test_a_file_that_is_none_ends_with_one_line_and_exit_code_2(tmp_path, name):
     (tmp_path / "text.h5").write_text("not HDF5")
     with h5py.File(tmp_path / "other.h5", "w") as file:

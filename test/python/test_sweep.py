@@ -241,6 +241,64 @@ def test_a_case_that_fails_in_a_lane_disturbs_no_other(here):
     np.testing.assert_array_equal(data.n_rhs[others], good.n_rhs[others])
 
 
+FREQUENCIES = """&sweep base = 'base.nml', frequencies = 9, {} probe_times = 0.02, 0.05 /
+&axis key = 'chain.hinge_stiffness(0)', values = 2000, 5000 /
+&axis key = 'model.inertia', text_values = 'distributed', 'lumped' /
+"""
+
+
+def modes(here: pathlib.Path, *changes: tuple[str, str]) -> xarray.Dataset:
+    text = BASE
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    (here / "one.nml").write_text(text)
+    subprocess.run([RODYN, "modes", "one.nml", "--force", "--quiet"], cwd=here, check=True)
+    with xarray.open_dataset(here / "one_modes.h5") as data:
+        return data.load()
+
+
+def test_frequencies_are_those_of_rodyn_modes_beside_the_states(here):
+    sweep(here, FREQUENCIES.format(""))
+    data = opened(here)
+    assert data.frequency.dims == data.damping_ratio.dims == ("case", "mode") and data.sizes["mode"] == 9
+    assert data.frequency.units == "rad s-1" and not np.isnan(data.phi).any()
+    for case, stiffness, model in ((0, 2000, ""), (3, 5000, "&model inertia = 'lumped', bending = 'quasistatic' /")):
+        found = modes(here, ("= 5000", f"= {stiffness}, 2*5000"), ("&solver", model + "&solver"))
+        found = found.isel(mode=found.kind.values == "oscillation")
+        n = min(9, found.sizes["mode"])
+        np.testing.assert_allclose(data.frequency[case, :n], found.frequency[:n], rtol=1e-12)
+        np.testing.assert_allclose(data.damping_ratio[case, :n], found.damping_ratio[:n], rtol=1e-6)
+        assert np.isnan(data.frequency[case, n:]).all() and n == (9 if model == "" else 3)
+    sweep(here, FREQUENCIES.format("").replace("frequencies = 9, ", ""), name="plain")
+    np.testing.assert_array_equal(opened(here, "plain").phi, data.phi)  # they do not touch the integration
+
+
+@pytest.mark.parametrize("how", ["", "integrate = .false.,"])
+def test_frequencies_have_the_same_bytes_in_every_way(here, how):
+    text = FREQUENCIES.format(how)
+    sweep(here, text)
+    wanted = content(here / "s")
+    for shard in (2, 1, 3):
+        sweep(here, text, "--shard", f"{shard}/3", name="shards")
+    assert content(here / "shards") == wanted
+    (here / "s" / "sweep.h5").unlink()
+    (shard,) = (here / "s" / "shards").glob("*.shard")
+    damaged = bytearray(shard.read_bytes())
+    damaged[-200] ^= 1
+    shard.write_bytes(damaged)  # one result is done again
+    assert "checksum wrong; set aside, 3 good results" in sweep(here, None).stderr
+    assert content(here / "s") == wanted
+
+
+def test_frequencies_alone_cost_no_integration(here):
+    result = sweep(here, FREQUENCIES.format("integrate = .false.,"))
+    assert "lanes   none" in result.stdout
+    data = opened(here)
+    assert "phi" not in data and "probe_time" not in data and list(data.status) == ["done"] * 4
+    assert not data.n_rhs.any() and not data.t_reached.any() and not np.isnan(data.frequency[0]).any()
+
+
 def test_running_again_computes_nothing(here):
     sweep(here, GRID)
     before = (here / "s" / "sweep.h5").read_bytes()

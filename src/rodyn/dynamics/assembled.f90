@@ -104,7 +104,7 @@ contains
    subroutine soften(scene, b)
       type(scene_type), intent(in) :: scene
       real(wp), intent(inout) :: b(0:, :)
-      real(wp) :: g(0:scene%n - 1, 0:scene%n - 1), c(0:scene%n - 1), slope
+      real(wp) :: g(0:scene%n - 1, 0:scene%n - 1), c(0:scene%n - 1)
       integer :: pivots(scene%n), info, k
 
       g = 0.0_wp
@@ -113,14 +113,13 @@ contains
          if (.not. scene%hinges%locked(k)) g(k, k) = 1.0_wp
       end do
       do k = 1, scene%n
-         associate (rod => scene%rods(scene%rod_of(k)))
-            slope = rod%length/(6.0_wp*rod%bending_stiffness)
+         associate (f => scene%rods(scene%rod_of(k))%flexibility)
+            g(k - 1, k - 1) = g(k - 1, k - 1) + f(1)*c(k - 1)
+            if (k == scene%n) cycle
+            g(k, k) = g(k, k) + f(3)*c(k)
+            g(k - 1, k) = f(2)*c(k)
+            g(k, k - 1) = f(2)*c(k - 1)
          end associate
-         g(k - 1, k - 1) = g(k - 1, k - 1) + 2.0_wp*slope*c(k - 1)
-         if (k == scene%n) cycle
-         g(k, k) = g(k, k) + 2.0_wp*slope*c(k)
-         g(k - 1, k) = slope*c(k)
-         g(k, k - 1) = slope*c(k - 1)
       end do
       call dgesv(scene%n, scene%n_dof, g, scene%n, pivots, b, scene%n, info)
    end subroutine soften

@@ -150,8 +150,10 @@ contains
       end if
       call slopes(scene, q, p, alpha, beta, alpha_rate, beta_rate)
       do k = 1, scene%n
-         elastic_energy = elastic_energy + scene%rods(scene%rod_of(k))%kappa* &
-                          (alpha(k)**2 + alpha(k)*beta(k) + beta(k)**2)
+         associate (s => scene%rods(scene%rod_of(k))%stiffness, carry => scene%rods(scene%rod_of(k))%carry_over)
+            elastic_energy = elastic_energy + 0.5_wp*s(1)* &
+                             (alpha(k)**2 + (2.0_wp*carry(1)*alpha(k))*beta(k) + (s(3)/s(1)*beta(k))*beta(k))
+         end associate
       end do
    end function elastic_energy
 

@@ -97,8 +97,8 @@ contains
                mvv_rate = p(i, ia + k)*qa + p(i, ib + k)*qb
 
                ! Moments on the slopes.
-               qa = -moment_in - rod%kappa(i)*(2.0_wp*alpha(i, k) + beta(i, k))
-               qb = moment_out(i) - rod%kappa(i)*(alpha(i, k) + 2.0_wp*beta(i, k))
+               qa = -moment_in - rod%k11(i)*(alpha(i, k) + rod%carry_out(i)*beta(i, k))
+               qb = moment_out(i) - rod%k22(i)*(rod%carry_in(i)*alpha(i, k) + beta(i, k))
                gq = rod%g1(i)*qa + rod%g2(i)*qb
                hq = rod%h1(i)*qa + rod%h2(i)*qb
                r0 = moment_out(i) - moment_in - hq - w2*(rod%sa(i)*alpha(i, k) + rod%sb(i)*beta(i, k)) - w*mvv_rate

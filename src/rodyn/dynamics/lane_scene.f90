@@ -14,8 +14,9 @@ module rodyn_lane_scene
 
    !> What the recursion reads of a rod (`rodyn_rod_constants`).
    type :: lane_rod
-      real(wp), dimension(lanes) :: length, length_2, kappa, m0, m1, a1, b1, sa, sb, aa, ab, bb, b11, b12, b22, &
-                                    g1, g2, h1, h2, m0_reduced, m1_reduced, m2_reduced, central, length_m1, offset, outer
+      real(wp), dimension(lanes) :: length, length_2, k11, k22, carry_out, carry_in, m0, m1, a1, b1, sa, sb, aa, ab, bb, b11, &
+                                    b12, b22, g1, g2, h1, h2, m0_reduced, m1_reduced, m2_reduced, central, length_m1, &
+                                    offset, outer
    end type lane_rod
 
    !> A group of scenes.
@@ -133,7 +134,10 @@ contains
 
       rods%length(lane) = rod%length
       rods%length_2(lane) = rod%length_2
-      rods%kappa(lane) = rod%kappa
+      rods%k11(lane) = rod%stiffness(1)
+      rods%k22(lane) = rod%stiffness(3)
+      rods%carry_out(lane) = rod%carry_over(1)
+      rods%carry_in(lane) = rod%carry_over(2)
       rods%m0(lane) = rod%inertia%m0
       rods%m1(lane) = rod%inertia%m1
       rods%a1(lane) = rod%inertia%a1

@@ -24,7 +24,7 @@ module rodyn_motion
    use rodyn_lapack, only: dpotrf, dpotrs
    implicit none (type, external)
    private
-   public :: motion_type, new_motion, initial_state, state_invariants
+   public :: motion_type, new_motion, initial_state, state_invariants, differentiate_balance
 
    !> A running scene.
    type, extends(mechanical_system) :: motion_type
@@ -352,22 +352,22 @@ contains
       end associate
    end function state_invariants
 
-   !> Exact Jacobian: the linearised balance solved with the mass matrix, from which what locked hinges make redundant is
-   !> eliminated (`rodyn_locks`). It takes the coordinates as they stand, also where they break the constraints.
-   subroutine jacobian(self, t, y, jac, ok)
+   !> Derivatives of the balance R = M p' - rhs(q, p) by q and p at a state, p' held fixed, and of th' of relaxing hinges
+   !> by q. The mass matrix is left in `self%system%m`.
+   subroutine differentiate_balance(self, t, y, a, by_state, joints, ok)
       class(motion_type), intent(inout) :: self
       real(wp), intent(in) :: t
-      real(wp), contiguous, intent(in) :: y(:)
-      real(wp), contiguous, intent(out) :: jac(:, :)
-      logical, intent(out) :: ok
+      real(wp), intent(in) :: y(:)                 !! (q, p, ...)
+      real(wp), intent(out) :: a(self%n_dof)       !! p'
+      real(wp), intent(out) :: by_state(self%n_dof, self%n_q + self%n_dof) !! columns dR/dq, dR/dp
+      real(wp), intent(out) :: joints(self%n_q - self%n_dof, self%n_q)     !! dth'/dq
+      logical, intent(out) :: ok                   !! false: no accelerations, or no memory
       type(error_type), allocatable :: error
-      real(wp) :: a(self%n_dof), direction(self%n_controlled), change(self%n_dof, self%n_controlled)
-      real(wp) :: still(0:self%dynamics%scene%n - 1)
-      integer :: j, info
+      real(wp) :: direction(self%n_q + self%n_dof)
+      integer :: j
 
+      ok = .true.
       associate (r => self%n_q, m => self%n_dof, scene => self%dynamics%scene, work => self%dynamics%work)
-         jac = 0.0_wp
-         ok = .true.
          if (.not. allocated(self%system%m)) call new_assembled_system(self%system, scene, error)
          if (.not. allocated(error)) call self%dynamics%accelerations(t, y(1:r), y(r + 1:r + m), a, ok)
          ok = ok .and. .not. allocated(error)
@@ -376,11 +376,31 @@ contains
          do j = 1, r + m
             direction(j) = 1.0_wp
             call balance_tangent(scene, y(1:r), y(r + 1:r + m), a, self%dynamics%regime%on_nodes, &
-                                 self%dynamics%forces%node, direction(1:r), direction(r + 1:), change(:, j))
-            if (r > m) call relaxation_column(self, direction(1:r), direction(r + 1:), jac(m + 1:r, j))
+                                 self%dynamics%forces%node, direction(1:r), direction(r + 1:), by_state(:, j))
+            if (r > m .and. j <= r) call relaxation_column(self, direction(1:r), direction(r + 1:), joints(:, j))
             direction(j) = 0.0_wp
          end do
          call mass_matrix(self%system, scene, work%sine, work%cosine, y(1:r))
+      end associate
+   end subroutine differentiate_balance
+
+   !> Exact Jacobian: the linearised balance solved with the mass matrix, from which what locked hinges make redundant is
+   !> eliminated (`rodyn_locks`). It takes the coordinates as they stand, also where they break the constraints.
+   subroutine jacobian(self, t, y, jac, ok)
+      class(motion_type), intent(inout) :: self
+      real(wp), intent(in) :: t
+      real(wp), contiguous, intent(in) :: y(:)
+      real(wp), contiguous, intent(out) :: jac(:, :)
+      logical, intent(out) :: ok
+      real(wp) :: a(self%n_dof), change(self%n_dof, self%n_controlled), joints(self%n_q - self%n_dof, self%n_q)
+      real(wp) :: still(0:self%dynamics%scene%n - 1)
+      integer :: j, info
+
+      associate (r => self%n_q, m => self%n_dof, scene => self%dynamics%scene)
+         jac = 0.0_wp
+         call differentiate_balance(self, t, y, a, change, joints, ok)
+         if (.not. ok) return
+         jac(m + 1:r, 1:r) = joints
          if (has_slaves(scene)) then
             call reduce_matrix(scene, 1.0_wp, self%system%m)
             do j = 1, r + m

@@ -94,7 +94,7 @@ contains
             self%hinge = law%stiffness
             if (size(law%relaxing) > 0) then
                self%hinge = law%stiffness + law%damping/gamma
-               call new_three_moments(self%balance, self%hinge, law%series%slope, spread(.false., 1, scene%n))
+               call new_three_moments(self%balance, self%hinge, law%series%flexibility, spread(.false., 1, scene%n))
             end if
             call factorise_series(scene%n, gamma, scene%rods, scene%rod_of, scene%node_mass, self%hinge, self%damping, &
                                   self%tangent, self%damped, apparent, by_omega, ok)
@@ -157,9 +157,9 @@ contains
             pull(k) = law%damping(k)/self%gamma*self%angle(scene%n_dof + i)
          end do
          do k = 1, n
-            associate (slope => law%series%slope(k))
-               self%opening(k - 1) = self%opening(k - 1) + slope*(2.0_wp*pull(k - 1) + pull(k))
-               if (k < n) self%opening(k) = self%opening(k) + slope*(pull(k - 1) + 2.0_wp*pull(k))
+            associate (f => law%series%flexibility(:, k))
+               self%opening(k - 1) = self%opening(k - 1) + f(2)*(f(1)/f(2)*pull(k - 1) + pull(k))
+               if (k < n) self%opening(k) = self%opening(k) + f(2)*(pull(k - 1) + f(3)/f(2)*pull(k))
             end associate
          end do
          call self%balance%solve(self%opening)

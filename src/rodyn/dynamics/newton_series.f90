@@ -2,10 +2,10 @@
 !>
 !> With `reduced` dampers T = C G z + G^T D G z', G = (1 + F C)^-1, z the openings, ties all hinges of the chain to each
 !> other; relaxing hinges are springs C + D/g to a Newton system, and no dampers. This becomes local with two sets of
-!> slopes: those that the springs' moments m alone bend, and those that the whole moments T bend. With f = l/(6 EI), s the
-!> opening of a hinge under springs alone (all angles in units of g^2),
-!>     s_{k-1} = phi - f (2 m_{k-1} + m_k) - tau_x,      m = C s,                         tau_x' = phi + f (m_{k-1} + 2 m_k),
-!>     T_{k-1} = g^2 C (phi - f/g^2 (2 T_{k-1} + T_k) - tau_s) + g D s_{k-1},       tau_s' = phi + f/g^2 (T_{k-1} + 2 T_k).
+!> slopes: those that the springs' moments m alone bend, and those that the whole moments T bend. With f the
+!> flexibility of the rod, s the opening of a hinge under springs alone (all angles in units of g^2),
+!>     s_{k-1} = phi - (f11 m_{k-1} + f12 m_k) - tau_x,     m = C s,              tau_x' = phi + f12 m_{k-1} + f22 m_k,
+!>     T_{k-1} = g^2 C (phi - (f11 T_{k-1} + f12 T_k)/g^2 - tau_s) + g D s_{k-1},    tau_s' = phi + (f12 T_{k-1} + f22 T_k)/g^2.
 !> The chain beyond hinge k - 1 is seen as in `rodyn_newton_chain`, with two rotations and two moments:
 !>     (fe, fn, -T, -m) = P (dAe, dAn, tau_s, tau_x) + P_w w' + b.
 !> The moments are unknowns themselves, not differences of stiff springs' ends, so no stiffness costs digits.
@@ -25,7 +25,8 @@ module rodyn_newton_series
       real(wp) :: by_inner(5, 5) !! unknowns = y - by_inner (dAe, dAn, tau_s, tau_x, w')
       real(wp) :: force(2, 5)   !! fe, fn by the unknowns
       real(wp) :: stiffness     !! C of hinge k - 1
-      real(wp) :: slope, bend   !! f, f/g^2
+      real(wp) :: slope(3), bend(3) !! f, f/g^2
+      real(wp) :: outer_ratio   !! f22/f12
    end type series_factor
 
 contains
@@ -86,14 +87,17 @@ contains
       real(wp) :: answer(4, 5), spring
       integer :: j
 
-      f%slope = 1.0_wp/(3.0_wp*rod%kappa)
+      associate (k => rod%stiffness) ! f is its inverse; f12 factored out
+         f%outer_ratio = k(1)/k(2)
+         f%slope = [k(3)/k(2), 1.0_wp, f%outer_ratio]/(k(1)*(k(3)/k(2)) - k(2))
+      end associate
       f%bend = f%slope/gamma**2
       spring = gamma**2*f%stiffness
       answer(:, 1) = p(:, 1)*f%ae_phi + p(:, 2)*f%an_phi + p(:, 3) + p(:, 4)
-      answer(:, 2) = p(:, 4)*f%slope*f%stiffness
-      answer(:, 3) = p(:, 3)*f%bend
-      answer(:, 4) = p(:, 3)*2.0_wp*f%bend
-      answer(:, 5) = p(:, 4)*2.0_wp*f%slope
+      answer(:, 2) = p(:, 4)*f%slope(2)*f%stiffness
+      answer(:, 3) = p(:, 3)*f%bend(2)
+      answer(:, 4) = p(:, 3)*f%bend(3)
+      answer(:, 5) = p(:, 4)*f%slope(3)
       p(:, 5) = p(:, 5) + p(:, 1)*f%ae_w + p(:, 2)*rod%length
       f%force = answer(1:2, :)
 
@@ -101,8 +105,8 @@ contains
       own(1, 1) = own(1, 1) + gamma**2*t%phi_phi
       own(1, 3) = own(1, 3) + 1.0_wp
       own(1, 4) = own(1, 4) - 1.0_wp
-      own(2, :) = [-1.0_wp, 1.0_wp + 2.0_wp*f%slope*f%stiffness, 0.0_wp, 0.0_wp, f%slope]
-      own(3, :) = [-spring, -damper, 1.0_wp + 2.0_wp*f%slope*f%stiffness, f%slope*f%stiffness, 0.0_wp]
+      own(2, :) = [-1.0_wp, 1.0_wp + f%slope(1)*f%stiffness, 0.0_wp, 0.0_wp, f%slope(2)]
+      own(3, :) = [-spring, -damper, 1.0_wp + f%slope(1)*f%stiffness, f%slope(2)*f%stiffness, 0.0_wp]
       own(4, :) = answer(3, :)
       own(4, 4) = own(4, 4) + 1.0_wp
       own(5, :) = answer(4, :)
@@ -227,8 +231,8 @@ contains
             inner(1) = inner(1) - length*(2.0_wp*t%w*(d_omega + phi_rate(k)) + t%wr*phi(k)) + f%ae_w*omega_rate + &
                        f%ae_phi*left(1, k)
             inner(2) = inner(2) - length*t%w**2*phi(k) + length*omega_rate + f%an_phi*left(1, k)
-            inner(3) = left(1, k) + f%bend*(left(3, k) + 2.0_wp*left(4, k))
-            inner(4) = left(1, k) + f%slope*(f%stiffness*left(2, k) + 2.0_wp*left(5, k))
+            inner(3) = left(1, k) + f%bend(2)*(left(3, k) + f%outer_ratio*left(4, k))
+            inner(4) = left(1, k) + f%slope(2)*(f%stiffness*left(2, k) + f%outer_ratio*left(5, k))
          end associate
       end do
    end subroutine expand_series

@@ -170,9 +170,9 @@ contains
          t%fn_b = -w2*i%b1
          t%phi_a = -i%a1*ae + 2.0_wp*(t%wr*sx(1) + w*sv(1))
          t%phi_b = -i%b1*ae + 2.0_wp*(t%wr*sx(2) + w*sv(2))
-         t%a_a = 2.0_wp*rod%kappa - w2*i%aa
-         t%a_b = rod%kappa - w2*i%ab
-         t%b_b = 2.0_wp*rod%kappa - w2*i%bb
+         t%a_a = rod%stiffness(1) - w2*i%aa
+         t%a_b = rod%stiffness(2) - w2*i%ab
+         t%b_b = rod%stiffness(3) - w2*i%bb
       end associate
    end subroutine differentiate_bending
 

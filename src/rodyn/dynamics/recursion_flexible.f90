@@ -98,8 +98,8 @@ contains
             mvv_rate = p(ia + k)*qa + p(ib + k)*qb
 
             ! Moments on the slopes; the centrifugal part W^2 B (alpha, beta) leaves B^-1 as W^2 (alpha, beta).
-            qa = -moment_in - rod%kappa*(2.0_wp*alpha + beta)
-            qb = moment_out - rod%kappa*(alpha + 2.0_wp*beta)
+            qa = -moment_in - rod%stiffness(1)*(alpha + rod%carry_over(1)*beta)
+            qb = moment_out - rod%stiffness(3)*(rod%carry_over(2)*alpha + beta)
             gq = rod%g(1)*qa + rod%g(2)*qb
             hq = rod%h(1)*qa + rod%h(2)*qb
             r0 = moment_out - moment_in - hq - w2*(i%sa*alpha + i%sb*beta) - w*mvv_rate

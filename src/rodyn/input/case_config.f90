@@ -8,7 +8,7 @@ module rodyn_case_config
    use rodyn_kinds, only: wp
    implicit none (type, external)
    private
-   public :: case_config, spacecraft_config, chain_config, model_config, initial_config, load_config, kink_config, &
+   public :: case_config, spacecraft_config, chain_config, profile_config, model_config, initial_config, load_config, kink_config, &
       hinge_config, solver_config, output_config, none_given
    public :: name_length
 
@@ -35,6 +35,17 @@ module rodyn_case_config
       real(wp), allocatable :: hinge_damping(:)     !! D (0:n-1) [N m s/rad]
       real(wp), allocatable :: kink(:)              !! gamma (0:n-1) [rad]
    end type chain_config
+
+   !> One &rod_profile group: a factor on the mass per length or the bending stiffness of some rods, over s/l = 0..1, as a
+   !> polynomial or as a table
+   type :: profile_config
+      character(len=name_length) :: quantity = 'mass_per_length' !! 'mass_per_length' or 'bending_stiffness'
+      integer :: first_rod = 1              !! 1..n
+      integer :: last_rod = huge(1)         !! first_rod..n
+      real(wp), allocatable :: polynomial(:) !! c0, c1, ...: sum c_i (s/l)^i
+      real(wp), allocatable :: positions(:)  !! of the table, s/l from 0 to 1, rising; equal neighbours make a jump
+      real(wp), allocatable :: values(:)     !! of the table, linear in between
+   end type profile_config
 
    !> &model
    type :: model_config
@@ -138,6 +149,7 @@ module rodyn_case_config
       integer :: n_outputs = 1000 !! intervals; n_outputs + 1 rows
       type(spacecraft_config) :: spacecraft
       type(chain_config) :: chain
+      type(profile_config), allocatable :: profiles(:) !! may be left unallocated: uniform rods
       type(model_config) :: model
       type(initial_config) :: initial
       type(load_config), allocatable :: loads(:)

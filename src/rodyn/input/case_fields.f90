@@ -1,7 +1,7 @@
 !> All keys of a case, each with its component, in the order of the table.
 module rodyn_case_fields
    use rodyn_case_config, only: case_config, chain_config, hinge_config, initial_config, kink_config, load_config, &
-      model_config, output_config, solver_config, spacecraft_config
+      model_config, output_config, profile_config, solver_config, spacecraft_config
    use rodyn_field_visitor, only: field_visitor
    implicit none (type, external)
    private
@@ -9,7 +9,7 @@ module rodyn_case_fields
 
 contains
 
-   !> Visit every key of a case whose `loads`, `kink_programs` and `hinges` have been allocated.
+   !> Visit every key of a case whose `profiles`, `loads`, `kink_programs` and `hinges` have been allocated.
    subroutine visit_case(visitor, config)
       class(field_visitor), intent(inout) :: visitor
       type(case_config), intent(inout) :: config
@@ -22,6 +22,9 @@ contains
       call visitor%close_group()
       call visit_spacecraft(visitor, config%spacecraft)
       call visit_chain(visitor, config%chain)
+      do i = 1, size(config%profiles)
+         call visit_profile(visitor, i, config%profiles(i))
+      end do
       call visit_model(visitor, config%model)
       call visit_initial(visitor, config%initial)
       do i = 1, size(config%loads)
@@ -63,6 +66,20 @@ contains
       call visitor%field('kink', chain%kink)
       call visitor%close_group()
    end subroutine visit_chain
+
+   subroutine visit_profile(visitor, instance, profile)
+      class(field_visitor), intent(inout) :: visitor
+      integer, intent(in) :: instance
+      type(profile_config), intent(inout) :: profile
+      call visitor%open_group('rod_profile', instance)
+      call visitor%word_field('quantity', profile%quantity)
+      call visitor%field('first_rod', profile%first_rod)
+      call visitor%field('last_rod', profile%last_rod)
+      call visitor%field('polynomial', profile%polynomial)
+      call visitor%field('positions', profile%positions)
+      call visitor%field('values', profile%values)
+      call visitor%close_group()
+   end subroutine visit_profile
 
    subroutine visit_model(visitor, model)
       class(field_visitor), intent(inout) :: visitor

@@ -75,9 +75,10 @@ contains
       call match_document(document, case_groups, case_rows, checked)
       call check_document(checked, case_extents(rods_of(checked)))
       loader%checked => checked
-      allocate (config%loads(instances(checked, 'load')), config%kink_programs(instances(checked, 'kink_program')), &
-                config%hinges(instances(checked, 'hinge')))
+      allocate (config%profiles(instances(checked, 'rod_profile')), config%loads(instances(checked, 'load')), &
+                config%kink_programs(instances(checked, 'kink_program')), config%hinges(instances(checked, 'hinge')))
       call visit_case(loader, config)
+      call complete_profiles(checked, config)
       call complete_loads(checked, config)
       call complete_kinks(checked, config)
       call check_case(checked, config)
@@ -114,7 +115,18 @@ contains
       end do
    end subroutine complete_loads
 
-   !> The same for kinks that move; a table knows its times.
+   !> Profiles reach to the last rod.
+   subroutine complete_profiles(checked, config)
+      type(checked_document), intent(in) :: checked
+      type(case_config), intent(inout) :: config
+      integer :: i
+
+      do i = 1, size(config%profiles)
+         if (entry_of(checked, 'rod_profile', i, 'last_rod') == 0) config%profiles(i)%last_rod = config%chain%n_rods
+      end do
+   end subroutine complete_profiles
+
+   !> Times of loads, for kinks that move; a table knows its times.
    subroutine complete_kinks(checked, config)
       type(checked_document), intent(in) :: checked
       type(case_config), intent(inout) :: config

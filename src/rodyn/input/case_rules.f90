@@ -1,10 +1,11 @@
 !> Rules that tie several keys of a case together. What one key alone must keep stands in the table.
 module rodyn_case_rules
    use rodyn_kinds, only: wp
-   use rodyn_case_config, only: case_config, load_config
+   use rodyn_case_config, only: case_config, load_config, profile_config
    use rodyn_case_fields, only: law_takes
    use rodyn_checked_document, only: checked_document, blame, entry_of, is_sound
    use rodyn_hinge_rules, only: check_moving_hinges
+   use rodyn_rod_profile, only: rod_profile, new_rod_profile, smallest_value
    use rodyn_text, only: to_text
    implicit none (type, external)
    private
@@ -25,6 +26,10 @@ contains
       call check_bending(checked, config)
       call check_masses(checked, config)
       call check_solver(checked, config)
+      do i = 1, size(config%profiles)
+         call check_profile_rods(checked, i, config%profiles(i), config%chain%n_rods)
+         call check_profile(checked, i, config%profiles(i), config%model%bending == 'quasistatic')
+      end do
       do i = 1, size(config%loads)
          call check_target(checked, i, config%loads(i), config%chain%n_rods)
          call check_law_keys(checked, i, config%loads(i))
@@ -171,6 +176,83 @@ contains
       end function sound_chain
 
    end subroutine check_masses
+
+   !> A profile reaches from one existing rod to another.
+   subroutine check_profile_rods(checked, i, profile, n_rods)
+      type(checked_document), intent(inout) :: checked
+      integer, intent(in) :: i !! which profile
+      type(profile_config), intent(in) :: profile
+      integer, intent(in) :: n_rods !! 0: not known
+
+      if (.not. (is_sound(checked, 'rod_profile', i, 'first_rod') .and. is_sound(checked, 'rod_profile', i, 'last_rod'))) return
+      if (n_rods > 0 .and. max(profile%first_rod, profile%last_rod) > n_rods) then
+         call blame(checked, 'rod_profile', i, trim(merge('first_rod', 'last_rod ', profile%first_rod > n_rods)), &
+            'there is no such rod; they are numbered 1..'//to_text(n_rods))
+      else if (n_rods > 0 .and. profile%first_rod > profile%last_rod) then
+         call blame(checked, 'rod_profile', i, 'last_rod', 'must not be less than first_rod = '//to_text(profile%first_rod))
+      end if
+   end subroutine check_profile_rods
+
+   !> A polynomial or a table, and a factor that is nowhere negative: not zero either where rods bend by statics alone, whose
+   !> flexibility is 1/EI.
+   subroutine check_profile(checked, i, profile, positive)
+      type(checked_document), intent(inout) :: checked
+      integer, intent(in) :: i !! which profile
+      type(profile_config), intent(in) :: profile
+      logical, intent(in) :: positive !! zero is no bending stiffness
+      type(rod_profile) :: compiled
+      character(len=:), allocatable :: key
+      logical :: ok
+
+      key = 'polynomial'
+      if (given(checked, 'rod_profile', i, 'positions') .or. given(checked, 'rod_profile', i, 'values')) then
+         if (given(checked, 'rod_profile', i, key)) then
+            call blame(checked, 'rod_profile', i, key, 'does not go with positions and values')
+            return
+         end if
+         key = 'values'
+         call require(checked, 'rod_profile', i, 'positions', 'with values')
+         call require(checked, 'rod_profile', i, 'values', 'with positions')
+         if (size(profile%positions) == 0 .or. size(profile%values) == 0) return
+         call check_positions(checked, i, profile, ok)
+         if (.not. ok) return
+      else
+         call require(checked, 'rod_profile', i, key, 'unless positions and values are given')
+      end if
+      if (.not. is_sound(checked, 'rod_profile', i, key) .or. .not. is_sound(checked, 'rod_profile', i, 'positions')) return
+      call new_rod_profile(compiled, profile)
+      if (smallest_value(compiled) < 0.0_wp) then
+         call blame(checked, 'rod_profile', i, key, 'must not be negative anywhere from 0 to 1, but goes down to '// &
+            short(smallest_value(compiled)))
+      else if (.not. compiled%mean() > 0.0_wp) then
+         call blame(checked, 'rod_profile', i, key, 'must not be zero everywhere')
+      else if (positive .and. profile%quantity == 'bending_stiffness' .and. .not. smallest_value(compiled) > 0.0_wp) then
+         call blame(checked, 'rod_profile', i, key, "must be positive from 0 to 1 when bending = 'quasistatic'")
+      end if
+   end subroutine check_profile
+
+   !> As many values as positions, which rise from 0 to 1; two may be equal, three not.
+   subroutine check_positions(checked, i, profile, ok)
+      type(checked_document), intent(inout) :: checked
+      integer, intent(in) :: i
+      type(profile_config), intent(in) :: profile
+      logical, intent(out) :: ok
+
+      ok = .false.
+      associate (p => profile%positions, n => size(profile%positions))
+         if (size(profile%values) /= n) then
+            call blame(checked, 'rod_profile', i, 'values', 'must be as many as positions: '//to_text(n)//', not '// &
+               to_text(size(profile%values)))
+         else if (n < 2 .or. any(abs(p([1, n]) - [0.0_wp, 1.0_wp]) > 0.0_wp)) then
+            call blame(checked, 'rod_profile', i, 'positions', 'must begin with 0 and end with 1')
+         else if (any(p(2:) < p(:n - 1)) .or. any(p(3:) <= p(:n - 2)) .or. p(2) <= 0.0_wp .or. p(n - 1) >= 1.0_wp) then
+            call blame(checked, 'rod_profile', i, 'positions', &
+               'must rise; two equal ones make a jump, but not three, nor at the ends')
+         else
+            ok = .true.
+         end if
+      end associate
+   end subroutine check_positions
 
    !> Each method has its orders; only some take fixed steps.
    subroutine check_solver(checked, config)

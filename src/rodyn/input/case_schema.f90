@@ -9,10 +9,12 @@ module rodyn_case_schema
 
    integer, parameter :: rods = 1, nodes = 2, hinges = 3
 
-   type(schema_group), parameter :: case_groups(10) = [ &
+   type(schema_group), parameter :: case_groups(11) = [ &
       schema_group('case', help='what is computed'), &
       schema_group('spacecraft', help='rigid body that carries hinge 0'), &
       schema_group('chain', help='rods and nodes 1..n, hinges 0..n-1; one single value fills a whole array'), &
+      schema_group('rod_profile', repeatable=.true., &
+         help='how a value of &chain varies along rods: times a factor over s/l; repeat the group, or leave it out'), &
       schema_group('model', help='which equations, and how they are evaluated'), &
       schema_group('initial', help='state at t = 0'), &
       schema_group('load', repeatable=.true., help='one load; repeat the group for each load, or leave it out'), &
@@ -57,6 +59,18 @@ module rodyn_case_schema
          help='viscous damper D of each hinge'), &
       schema_row('chain', 'kink', type_real, hinges, 'rad', '0.0', &
          help='imposed break gamma of the axis at each hinge'), &
+      schema_row('rod_profile', 'quantity', type_word, words='mass_per_length|bending_stiffness', &
+         example="'mass_per_length'", help='which key of &chain the factor multiplies'), &
+      schema_row('rod_profile', 'first_rod', type_integer, default='1', rule=at_least, low=1.0_wp, &
+         help='first rod that has this profile'), &
+      schema_row('rod_profile', 'last_rod', type_integer, default='depends', rule=at_least, low=1.0_wp, &
+         when='default: n_rods', help='last rod that has it'), &
+      schema_row('rod_profile', 'polynomial', type_real, any_list, default='depends', example='1.0', &
+         when='required unless positions and values are given', help='c0, c1, ...: the factor is sum c_i (s/l)**i'), &
+      schema_row('rod_profile', 'positions', type_real, any_list, default='depends', rule=in_range, low=0.0_wp, &
+         high=1.0_wp, when='instead of polynomial', help='s/l from 0 to 1, rising; two equal ones make a jump'), &
+      schema_row('rod_profile', 'values', type_real, any_list, default='depends', rule=not_negative, &
+         when='instead of polynomial', help='factor at each of the positions, linear in between'), &
       schema_row('model', 'formulation', type_word, default="'consistent'", words='consistent|paper', &
          help='every term kept, or second-order terms in bending dropped as in the article'), &
       schema_row('model', 'inertia', type_word, default="'distributed'", words='distributed|lumped', &

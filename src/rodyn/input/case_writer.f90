@@ -43,6 +43,7 @@ contains
       if (.not. allocated(copy%loads)) allocate (copy%loads(0))
       if (.not. allocated(copy%kink_programs)) allocate (copy%kink_programs(0))
       if (.not. allocated(copy%hinges)) allocate (copy%hinges(0))
+      if (.not. allocated(copy%profiles)) allocate (copy%profiles(0))
       call visit_case(writer, copy)
       text = writer%text%content()
    end function resolved_case

@@ -12,7 +12,7 @@ module rodyn_method_choice
    use rodyn_scene, only: scene_type
    use rodyn_fastest_rates, only: fastest_rates, with_rigid_rods
    use rodyn_integrator, only: solver_options, time_text
-   use rodyn_method_trial, only: candidates, effort_of_nodes, try_methods
+   use rodyn_method_trial, only: candidates, n_even, effort_of_nodes, try_methods
    implicit none (type, external)
    private
    public :: method_choice, choose_method
@@ -51,7 +51,7 @@ contains
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: y(:)  !! state at t = 0, without quadratures
       real(wp), intent(in) :: t_end !! [s]
-      real(wp) :: slow, explicit, forecast(size(candidates))
+      real(wp) :: slow, explicit, expected(n_even), forecast(size(candidates))
       integer :: best
 
       choice%method = trim(solver%method)
@@ -62,19 +62,20 @@ contains
       call fastest_rates(scene, y(:scene%n_q), choice%frequency, choice%decay)
       explicit = stages*t_end*max(choice%frequency/vibration_limit, choice%decay/stability_limit)
       choice%steps = explicit/stages
+      expected = expected_efforts(scene, options, choice%frequency, choice%decay, t_end)
       ! Latching excites all vibrations of the rods, which a trial on the beginning of the run does not see.
       if (scene%dynamic_bending .and. any(scene%hinges%mechanisms%latch < none_given)) return
       slow = 0.0_wp
       if (explicit >= long_run) &
          call fastest_rates(with_rigid_rods(scene), y(:scene%n_base + scene%n + scene%n_q - scene%n_dof), slow)
       if (explicit < long_run .or. max(choice%frequency, choice%decay) < stiff_ratio*slow) then
-         if (.not. collocation_is_cheaper(scene, options, choice%frequency, choice%decay, t_end)) return
+         if (expected(1) <= expected(2)) return
          choice%method = 'gauss'
          choice%steps = t_end*choice%frequency/collocation_phase(options%rtol)
          return
       end if
       call try_methods(scene, y, options, minval([t_end, scene%switches]), t_end, &
-                       trial_share, forecast, choice%effort)
+                       expected, trial_share, forecast, choice%effort)
       forecast(:2) = forecast(:2)/lead ! dop853, gauss
       best = minloc(forecast, dim=1)
       choice%tried = .true.
@@ -106,21 +107,23 @@ contains
       end if
    end function reason
 
-   !> Collocation against order 8, by what a unit of phase of the fastest vibration costs at the user's tolerance. The phases of
-   !> their steps are those of table 1 (docs/performance.md); they change little from scene to scene.
-   logical function collocation_is_cheaper(scene, options, frequency, decay, t_end)
+   !> Efforts of explicit steps of order 8 and of collocation, by what a unit of phase of the fastest vibration costs at the
+   !> user's tolerance. The phases of their steps are those of table 1 (docs/performance.md); they change little from scene
+   !> to scene. Collocation is out of the question (huge) where it has no lanes or hinges have events, or where dampers are faster than vibrations.
+   function expected_efforts(scene, options, frequency, decay, t_end) result(effort)
       type(scene_type), intent(in) :: scene
       type(solver_options), intent(in) :: options
       real(wp), intent(in) :: frequency, decay, t_end
+      real(wp) :: effort(n_even)
       real(wp) :: explicit_phase, radians
 
-      collocation_is_cheaper = .false.
-      if (scene%assembled .or. scene%n_q > scene%n_dof .or. decay > frequency .or. size(scene%hinges%mechanisms) > 0) return
       radians = frequency*t_end
       explicit_phase = vibration_limit*min(1.0_wp, (1.0e4_wp*options%rtol)**0.125_wp)
-      collocation_is_cheaper = first_search*scene%n_dof + iterations*effort_of_nodes(scene)*radians/ &
-                               collocation_phase(options%rtol) < (stages + 1.0_wp)*radians/explicit_phase
-   end function collocation_is_cheaper
+      effort(1) = (stages + 1.0_wp)*max(radians/explicit_phase, decay*t_end/stability_limit)
+      effort(2) = huge(1.0_wp)
+      if (scene%assembled .or. scene%n_q > scene%n_dof .or. decay > frequency .or. size(scene%hinges%mechanisms) > 0) return
+      effort(2) = first_search*scene%n_dof + iterations*effort_of_nodes(scene)*radians/collocation_phase(options%rtol)
+   end function expected_efforts
 
    !> Phase of the fastest vibration in a collocation step.
    pure real(wp) function collocation_phase(rtol)

@@ -12,7 +12,7 @@ module rodyn_method_trial
    use rodyn_integrators, only: new_integrator
    implicit none (type, external)
    private
-   public :: candidate_type, candidates, effort_of, effort_of_nodes, try_methods
+   public :: candidate_type, candidates, n_even, effort_of, effort_of_nodes, try_methods
 
    !> A method, with the highest order if it is not the usual one.
    type :: candidate_type
@@ -28,8 +28,10 @@ module rodyn_method_trial
    real(wp), parameter :: first_effort = 400.0_wp     !! of a candidate, doubled from round to round
    real(wp), parameter :: even_effort = 3000.0_wp     !! are enough to know the pace of methods that follow all vibrations
    real(wp), parameter :: clear_lead = 4.0_wp         !! of an implicit method, with which the trial ends
+   real(wp), parameter :: own_share = 0.2_wp         !! of its own run that the best candidate is tried on
+   real(wp), parameter :: sure_lead = 12.0_wp         !! of one over expectations, which may be wrong by 3
 
-   !> A run that can be continued.
+   !> A run that can be continued; started when first continued.
    type :: runner
       type(motion_type), pointer :: motion => null()
       class(integrator_type), allocatable :: integrator
@@ -65,38 +67,40 @@ contains
    !> Effort that each candidate would need from 0 to `t_end`, huge if it fails. An implicit method may creep at first,
    !> until vibrations it does not follow have died out. So its pace is that of the last round; that of order 2, which no
    !> vibration holds back, may go on growing.
-   subroutine try_methods(scene, y, options, t_first, t_end, share, forecast, effort)
+   !>
+   !> The pace of the even methods is known well enough beforehand where implicit ones leave them far behind. Only where
+   !> they do not, the even ones are tried, with no more effort than the best implicit method needs for the whole run.
+   subroutine try_methods(scene, y, options, t_first, t_end, expected, share, forecast, effort)
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: y(:)                  !! state at t = 0, without quadratures
       type(solver_options), intent(in) :: options
       real(wp), intent(in) :: t_first               !! end of the trial at the latest; no load switches before [s]
       real(wp), intent(in) :: t_end                 !! [s]
+      real(wp), intent(in) :: expected(n_even)      !! effort of the even methods; huge: of no use here
       real(wp), intent(in) :: share                 !! of the effort of the best even method, for one candidate at most
       real(wp), intent(out) :: forecast(size(candidates))
       real(wp), intent(out) :: effort               !! spent on the trial
       type(runner) :: runners(size(candidates))
-      real(wp) :: allowed, budget, others(size(candidates))
-      integer :: i
+      real(wp) :: allowed, budget
+      integer :: i, best
 
-      do i = 1, size(candidates)
-         call start_runner(runners(i), candidates(i), scene, y, options, t_first)
-      end do
+      forecast(:n_even) = expected
       allowed = first_effort
       do
-         do i = 1, size(candidates)
-            if (i <= n_even .and. runners(i)%effort > max(even_effort, 0.25_wp*allowed)) cycle
-            if (hopeless(runners(i), candidates(i), runners(1)%pace)) cycle
-            call continue_runner(runners(i), candidates(i), scene, y, t_first, allowed)
+         do i = n_even + 1, size(candidates)
+            if (hopeless(runners(i), candidates(i), t_end/forecast(1))) cycle
+            call continue_runner(runners(i), candidates(i), scene, y, options, t_first, allowed)
+            forecast(i) = forecast_of(runners(i), t_end, candidates(i)%order == 2 .and. allowed > 3.0_wp*first_effort)
          end do
-         forecast = [(forecast_of(runners(i), t_end, candidates(i)%order == 2 .and. allowed > 3.0_wp*first_effort), &
-                      i=1, size(candidates))]
-         if (any(runners%reached >= t_first) .or. runners(1)%failed) exit
+         best = n_even + minloc(forecast(n_even + 1:), dim=1)
+         if (sure_lead*forecast(best) > minval(expected) .and. &
+             (allowed > 3.0_wp*first_effort .or. any(runners%reached >= t_first))) call try_even()
+         if (any(runners%reached >= t_first)) exit
          budget = share*minval(forecast(:n_even))
+         if (forecast(best) < minval(forecast(:n_even))) budget = min(budget, own_share*forecast(best))
          if (1.4_wp*allowed >= budget) exit ! a short round would tell nothing
-         i = minloc(forecast, dim=1)
-         others = forecast
-         others(i) = huge(1.0_wp)
-         if (i > n_even .and. allowed > 3.0_wp*first_effort .and. clear_lead*forecast(i) < minval(others)) exit
+         if (allowed > 3.0_wp*first_effort .and. clear_lead*forecast(best) < &
+             minval(forecast, mask=[(i /= best, i=1, size(candidates))])) exit
          allowed = min(2.0_wp*allowed, budget)
       end do
       effort = sum(runners%effort)
@@ -104,6 +108,19 @@ contains
          if (allocated(runners(i)%integrator)) call runners(i)%integrator%finalize()
          if (associated(runners(i)%motion)) deallocate (runners(i)%motion)
       end do
+
+   contains
+
+      subroutine try_even()
+         integer :: j
+         do j = 1, n_even
+            if (expected(j) > sure_lead*minval(expected) .or. runners(j)%effort > max(even_effort, 0.25_wp*allowed)) cycle
+            call continue_runner(runners(j), candidates(j), scene, y, options, t_first, &
+                                 min(allowed, max(first_effort, forecast(best))))
+            forecast(j) = forecast_of(runners(j), t_end, .false.)
+         end do
+      end subroutine try_even
+
    end subroutine try_methods
 
    !> An implicit method that vibrations hold back goes on at its even pace.
@@ -171,10 +188,11 @@ contains
    end subroutine start_runner
 
    !> Go on until the effort is spent, or the end or a failure is met.
-   subroutine continue_runner(self, candidate, scene, y, t_end, allowed)
+   subroutine continue_runner(self, candidate, scene, y, options, t_end, allowed)
       type(runner), intent(inout) :: self
       type(candidate_type), intent(in) :: candidate
       type(scene_type), intent(in) :: scene
+      type(solver_options), intent(in) :: options
       real(wp), intent(in) :: y(:), t_end, allowed
       integer, parameter :: n_slices = 4 ! a slice too long costs no more than a quarter of what is allowed
       type(error_type), allocatable :: error
@@ -182,6 +200,7 @@ contains
       real(wp) :: state(size(y)), per_step, effort_before, reached_before, pace_before
       integer :: steps
 
+      if (.not. associated(self%motion)) call start_runner(self, candidate, scene, y, options, t_end)
       effort_before = self%effort
       reached_before = self%reached
       pace_before = self%pace

@@ -5,15 +5,12 @@
 !>     call run%append(row, error)                     ! once per output time
 !>     call run%finish('done', report, error)
 !>
-!> Until `finish` has put everything onto the disk, the file has a temporary name, `PATH.partial-PID`: whatever has the
-!> final name is complete. After a failure to write, the temporary file is removed and the type is as before `create`.
+!> Until `finish`, the file has a temporary name (`rodyn_result_file`). After a failure to write, it is removed and the type
+!> is as before `create`.
 module rodyn_run_file
-   use rodyn_build_info, only: compiler, compiler_options, git_commit, program_version
-   use rodyn_errors, only: error_type, exit_bad_input, raise
-   use rodyn_hdf5_files, only: hdf5_file, hdf5_version
+   use rodyn_errors, only: error_type, raise
    use rodyn_kinds, only: i8, wp
-   use rodyn_posix, only: host_name, ignore_file_size_signal, is_directory, is_writable, parent_directory, path_exists, &
-      process_id, remove_file, rename_new, rename_over, sync_path, utc_now
+   use rodyn_result_file, only: check_output_path, provenance, result_file, text_or_empty
    use rodyn_run_layout, only: i_alpha, i_alpha_rate, i_angular_momentum, i_beta, i_beta_rate, i_bubble, i_bubble_rate, &
       i_displacement_x, i_displacement_y, i_energy_dissipated, i_energy_elastic, i_energy_kinetic, i_energy_residual, &
       i_momentum_x, &
@@ -28,12 +25,7 @@ module rodyn_run_file
    integer, parameter :: bytes_per_real = 8
 
    !> What is known before the first row.
-   type :: run_header
-      character(len=:), allocatable :: title
-      character(len=:), allocatable :: input            !! the namelist as read
-      character(len=:), allocatable :: resolved_input   !! every key with the value used
-      character(len=:), allocatable :: notes            !! what to know about the model, one line each
-      character(len=:), allocatable :: sundials_version
+   type, extends(provenance) :: run_header
       integer :: n_rods = 0       !! n
       integer :: n_rows = 0       !! rows to expect; 0: unknown. Only sizes the blocks
       logical :: ledger = .true.  !! with energies and momenta
@@ -95,11 +87,7 @@ module rodyn_run_file
       real(wp), allocatable :: scalars(:)   !! (block_rows)
    end type column
 
-   type :: run_file
-      type(hdf5_file) :: file                          !! for attributes beyond those written here
-      character(len=:), allocatable :: path            !! final name
-      character(len=:), allocatable :: temporary_path
-      logical, private :: force = .false.
+   type, extends(result_file) :: run_file
       logical, private :: ledger = .true.
       logical, private :: bubbles = .false.
       integer, private :: n_rods = 0
@@ -113,13 +101,10 @@ module rodyn_run_file
       procedure :: append
       procedure :: write_events
       procedure :: finish
-      procedure :: discard
       procedure :: redirect
       procedure, private :: write_layout
-      procedure, private :: write_header
       procedure, private :: write_solver_report
       procedure, private :: write_waiting_rows
-      procedure, private :: put_on_disk
    end type run_file
 
 contains
@@ -143,29 +128,6 @@ contains
       self%force = .true.
    end subroutine redirect
 
-   !> Refuse a path at which no result can or may appear. Nothing is written.
-   subroutine check_output_path(path, force, error)
-      character(len=*), intent(in) :: path
-      logical, intent(in) :: force                       !! an existing file may be replaced
-      type(error_type), allocatable, intent(out) :: error
-      character(len=:), allocatable :: directory
-
-      directory = parent_directory(path)
-      if (len(path) == 0) then
-         call raise(error, 'the name of the output file is empty', exit_bad_input)
-      else if (is_directory(path)) then
-         call raise(error, path//': is a directory; give the name of a file', exit_bad_input)
-      else if (path_exists(path) .and. .not. force) then
-         call raise(error, path//': exists already; --force replaces it', exit_bad_input)
-      else if (.not. path_exists(directory)) then
-         call raise(error, path//": the directory '"//directory//"' does not exist", exit_bad_input)
-      else if (.not. is_directory(directory)) then
-         call raise(error, path//": '"//directory//"' is not a directory that can be read", exit_bad_input)
-      else if (.not. is_writable(directory)) then
-         call raise(error, path//": no permission to write in the directory '"//directory//"'", exit_bad_input)
-      end if
-   end subroutine check_output_path
-
    !> Make the file under its temporary name, with all data sets, empty, and the root attributes.
    subroutine create(self, path, header, force, error)
       class(run_file), intent(inout) :: self
@@ -176,13 +138,6 @@ contains
       integer :: i
       logical :: used
 
-      call check_output_path(path, force, error)
-      if (allocated(error)) return
-      call ignore_file_size_signal()
-
-      self%path = path
-      self%temporary_path = free_temporary_name(path)
-      self%force = force
       self%ledger = header%ledger
       self%bubbles = header%bubbles
       self%n_rods = header%n_rods
@@ -196,10 +151,10 @@ contains
          self%columns(i) = new_column(header, run_variables(i)%per_rod, used)
       end do
 
-      call self%file%create(self%temporary_path, error)
+      call self%begin(path, force, error)
       if (allocated(error)) return
       call self%write_layout(header%compression, error)
-      if (.not. allocated(error)) call self%write_header(header, error)
+      if (.not. allocated(error)) call self%write_provenance(header%provenance, error)
       if (.not. allocated(error)) call self%file%flush(error)
       if (allocated(error)) call self%discard()
    end subroutine create
@@ -297,25 +252,12 @@ contains
       if (.not. allocated(error)) call self%write_solver_report(report, error)
       if (.not. allocated(error)) call self%file%put_attribute('/', 't_reached', self%last_time, error)
       if (.not. allocated(error) .and. present(message)) call self%file%put_attribute('/', 'message', message, error)
-      if (.not. allocated(error)) call self%file%put_attribute('/', 'status', status, error)
-      if (.not. allocated(error)) call self%file%flush(error)
-      if (.not. allocated(error)) call self%file%close(error)
       if (allocated(error)) then
          call self%discard()
       else
-         call self%put_on_disk(error)
+         call self%complete(status, error)
       end if
    end subroutine finish
-
-   !> Give up: close and remove the temporary file.
-   subroutine discard(self)
-      class(run_file), intent(inout) :: self
-      type(error_type), allocatable :: ignored
-      character(len=:), allocatable :: failure
-
-      call self%file%close(ignored)
-      if (allocated(self%temporary_path)) failure = remove_file(self%temporary_path)
-   end subroutine discard
 
    !> All data sets, coordinates attached, and the group `solver`.
    subroutine write_layout(self, compression, error)
@@ -329,7 +271,7 @@ contains
          associate (coordinate => run_coordinates(i))
             name = trim(coordinate%name)
             call self%file%write(name, [(coordinate%first + k, k=0, self%n_rods + coordinate%beyond_n - 1)], compression, error)
-            if (.not. allocated(error)) call describe(self%file, name, '1', trim(coordinate%long_name), error)
+            if (.not. allocated(error)) call self%describe(name, '1', trim(coordinate%long_name), error)
             if (.not. allocated(error)) call self%file%make_scale(name, error)
             if (allocated(error)) return
          end associate
@@ -344,7 +286,7 @@ contains
             else
                call self%file%create_series(name, [integer ::], self%block_rows, compression, error)
             end if
-            if (.not. allocated(error)) call describe(self%file, name, trim(variable%units), trim(variable%long_name), error)
+            if (.not. allocated(error)) call self%describe(name, trim(variable%units), trim(variable%long_name), error)
             if (allocated(error)) return
             if (i == i_time) then
                call self%file%make_scale(name, error)
@@ -360,45 +302,6 @@ contains
 
       call self%file%create_group(solver_group, error)
    end subroutine write_layout
-
-   !> Unit and meaning of a data set.
-   subroutine describe(file, name, units, long_name, error)
-      type(hdf5_file), intent(in) :: file
-      character(len=*), intent(in) :: name, units, long_name
-      type(error_type), allocatable, intent(out) :: error
-
-      call file%put_attribute(name, 'units', units, error)
-      if (.not. allocated(error)) call file%put_attribute(name, 'long_name', long_name, error)
-   end subroutine describe
-
-   !> Root attributes: what ran, with what, on what.
-   subroutine write_header(self, header, error)
-      class(run_file), intent(in) :: self
-      type(run_header), intent(in) :: header
-      type(error_type), allocatable, intent(out) :: error
-
-      call put('title', text_or_empty(header%title))
-      call put('status', 'running')
-      call put('program_version', program_version)
-      call put('git_commit', git_commit)
-      call put('compiler', compiler())
-      call put('compiler_options', compiler_options())
-      call put('sundials_version', text_or_empty(header%sundials_version))
-      call put('hdf5_version', hdf5_version())
-      call put('hostname', host_name())
-      call put('created', utc_now())
-      call put('input', text_or_empty(header%input))
-      call put('resolved_input', text_or_empty(header%resolved_input))
-      call put('notes', text_or_empty(header%notes))
-
-   contains
-
-      subroutine put(name, value)
-         character(len=*), intent(in) :: name, value
-         if (.not. allocated(error)) call self%file%put_attribute('/', name, value, error)
-      end subroutine put
-
-   end subroutine write_header
 
    !> The attributes of the group `solver`.
    subroutine write_solver_report(self, report, error)
@@ -462,53 +365,6 @@ contains
       self%waiting = 0
    end subroutine write_waiting_rows
 
-   !> Sync the closed file, rename it, sync the directory's names. If the final name was taken meanwhile, the
-   !> result stays under its temporary name and the message says so.
-   subroutine put_on_disk(self, error)
-      class(run_file), intent(in) :: self
-      type(error_type), allocatable, intent(out) :: error
-      character(len=:), allocatable :: failure
-      logical :: taken
-
-      failure = sync_path(self%temporary_path)
-      if (len(failure) > 0) then
-         call raise(error, self%temporary_path//': the result could not be put onto the disk: '//failure)
-         return
-      end if
-
-      taken = .false.
-      if (self%force) then
-         failure = rename_over(self%temporary_path, self%path)
-      else
-         call rename_new(self%temporary_path, self%path, taken, failure)
-      end if
-      if (taken) then
-         call raise(error, self%path//": appeared while this run was computing and is left alone; this run's result is '"// &
-            self%temporary_path//"'", exit_bad_input)
-      else if (len(failure) > 0) then
-         call raise(error, self%path//": cannot be given its name: "//failure//"; the result is '"//self%temporary_path//"'")
-      else
-         failure = sync_path(parent_directory(self%path))
-         if (len(failure) > 0) call raise(error, self%path//': its name could not be put onto the disk: '//failure)
-      end if
-   end subroutine put_on_disk
-
-   !> A name beside the final one that no file has. Process numbers repeat in containers, so they alone will not do.
-   function free_temporary_name(path) result(name)
-      character(len=*), intent(in) :: path
-      character(len=:), allocatable :: name
-      character(len=32) :: suffix
-      integer :: attempt
-
-      write (suffix, '(".partial-", i0)') process_id()
-      name = path//trim(suffix)
-      do attempt = 2, 1000
-         if (.not. path_exists(name)) return
-         write (suffix, '(".partial-", i0, "-", i0)') process_id(), attempt
-         name = path//trim(suffix)
-      end do
-   end function free_temporary_name
-
    !> Memory for one block of one data set.
    pure function new_column(header, per_rod, used) result(entry)
       type(run_header), intent(in) :: header
@@ -538,12 +394,5 @@ contains
          rows = (header%n_rows - 1)/n_blocks + 1
       end if
    end function rows_per_block
-
-   pure function text_or_empty(text) result(value)
-      character(len=:), allocatable, intent(in) :: text
-      character(len=:), allocatable :: value
-      value = ''
-      if (allocated(text)) value = text
-   end function text_or_empty
 
 end module rodyn_run_file

@@ -5,6 +5,7 @@ module rodyn_command_line
    use rodyn_case_config, only: case_config
    use rodyn_case_reader, only: read_case, default_case
    use rodyn_file_text, only: read_text_file
+   use rodyn_modal_analysis, only: analyse_modes
    use rodyn_posix_files, only: watch_signals
    use rodyn_run, only: run_case
    use rodyn_posix, only: same_path, write_output
@@ -23,6 +24,8 @@ module rodyn_command_line
       logical :: force = .false.
       logical :: quiet = .false.
       logical :: help = .false.
+      logical :: equilibrium = .false.
+      logical :: loads = .false.
       character(len=:), allocatable :: shard  !! --shard
       logical :: dry_run = .false.
       logical :: retry_failed = .false.
@@ -42,7 +45,7 @@ contains
       command = ''
       if (command_argument_count() > 0) command = argument(1)
       select case (command)
-      case ('run', 'check', 'sweep')
+      case ('run', 'check', 'sweep', 'modes')
          call read_options(options, error)
          if (.not. allocated(error)) then
             if (options%help) then
@@ -52,6 +55,8 @@ contains
             else if (command == 'sweep') then
                call sweep_command(options, exit_code, error)
                if (.not. allocated(error)) return
+            else if (command == 'modes') then
+               call modes_command(options, error)
             else
                call check_command(options, error)
             end if
@@ -92,13 +97,35 @@ contains
       call read_case(options%file, config, text, error)
       if (allocated(error)) return
       path = output_path(options, config)
-      if (same_path(path, options%file)) then
-         call raise(error, path//': is the case itself; give the result another name by --output', exit_bad_input)
-         return
-      end if
+      call refuse_input(path, options%file, error)
+      if (allocated(error)) return
       call watch_signals()
       call run_case(config, path, error, input_text=text, force=options%force, quiet=options%quiet)
    end subroutine run_file_command
+
+   !> The result must not take the place of the case.
+   subroutine refuse_input(path, input, error)
+      character(len=*), intent(in) :: path, input
+      type(error_type), allocatable, intent(out) :: error
+      if (same_path(path, input)) &
+         call raise(error, path//': is the case itself; give the result another name by --output', exit_bad_input)
+   end subroutine refuse_input
+
+   !> rodyn modes
+   subroutine modes_command(options, error)
+      type(options_type), intent(in) :: options
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+      character(len=:), allocatable :: text, path
+
+      call read_case(options%file, config, text, error)
+      if (allocated(error)) return
+      path = base_name(options%file)//'_modes.h5'
+      if (allocated(options%output)) path = options%output
+      call refuse_input(path, options%file, error)
+      if (.not. allocated(error)) call analyse_modes(config, path, options%equilibrium, options%loads, error, input_text=text, &
+                                                     force=options%force, quiet=options%quiet)
+   end subroutine modes_command
 
    !> rodyn check
    subroutine check_command(options, error)
@@ -232,6 +259,10 @@ contains
             options%force = .true.
          else if (word == '--quiet') then
             options%quiet = .true.
+         else if (word == '--equilibrium' .and. argument(1) == 'modes') then
+            options%equilibrium = .true.
+         else if (word == '--loads' .and. argument(1) == 'modes') then
+            options%loads = .true.
          else if (word == '--dry-run' .and. argument(1) == 'sweep') then
             options%dry_run = .true.
          else if (word == '--retry-failed' .and. argument(1) == 'sweep') then
@@ -293,6 +324,18 @@ contains
                 '  --quiet            print nothing but errors'//nl// &
                 'Exit codes: 0 done, 1 the run failed (the file holds all rows until then), 2 bad input,'//nl// &
                 '75 stopped by SIGTERM, SIGUSR1 or SIGINT (rows until then in FILE.h5.stopped; run again).'
+      case ('modes')
+         text = 'rodyn modes CASE.nml [--equilibrium | --loads] [--output FILE.h5] [--force] [--quiet]'//nl// &
+                '  Linearise the scene in full at its initial state, without its loads. Natural frequencies,'//nl// &
+                '  damping ratios, mode shapes and matrices go to one HDF5 file (default: CASE_modes.h5 in the working'//nl// &
+                '  directory), a table to the terminal.'//nl// &
+                '  --equilibrium      at the equilibrium near the initial state instead, under the loads that act at'//nl// &
+                '                     t = 0 (they must be constant), at rest on a spacecraft with the initial spin'//nl// &
+                '  --loads            at the initial state, under the loads that act at t = 0'//nl// &
+                '  --output FILE.h5   name of the result'//nl// &
+                '  --force            replace an existing result'//nl// &
+                '  --quiet            print nothing but errors'//nl// &
+                'Exit codes: 0 done, 1 no modes or no equilibrium, 2 bad input.'
       case ('sweep')
          text = 'rodyn sweep SWEEP.nml [--output DIR] [--shard I/N] [--dry-run] [--retry-failed] [--force] [--quiet]'//nl// &
                 '  Compute many variants of a case; the result is DIR/sweep.h5 (default: SWEEP in the working directory).'//nl// &
@@ -315,6 +358,7 @@ contains
          text = 'Rodyn '//program_version//': planar dynamics of a chain of elastic rods on a spacecraft'//nl// &
                 '  rodyn run CASE.nml [--output FILE.h5] [--force] [--quiet]   one scene to one HDF5 file'//nl// &
                 '  rodyn sweep SWEEP.nml [--output DIR] [--shard I/N] ...      many scenes to DIR/sweep.h5'//nl// &
+                '  rodyn modes CASE.nml [--equilibrium] [--output FILE.h5]     natural frequencies and mode shapes'//nl// &
                 '  rodyn check FILE.nml                                        validate only'//nl// &
                 '  rodyn defaults [run|sweep]                                  a namelist with every key'//nl// &
                 '  rodyn --version | --help | COMMAND --help'

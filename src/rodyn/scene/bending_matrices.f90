@@ -31,14 +31,14 @@ contains
 
       bending%n = n
       if (n == 0) return
-      associate (i => rod%inertia, kappa => rod%kappa)
+      associate (i => rod%inertia)
          bending%first = [i%a1, i%b1, i%c1]
          bending%turning = [i%sa, i%sb, i%sc]
          bending%first(n + 1:) = 0.0_wp
          bending%turning(n + 1:) = 0.0_wp
          call fill(bending%inertia, n, [i%aa, i%ab, i%bb, i%ac, i%bc, i%cc])
          if (consistent) bending%second = bending%inertia
-         call fill(bending%stiffness, n, [2.0_wp*kappa, kappa, 2.0_wp*kappa, rod%bubble])
+         call fill(bending%stiffness, n, [rod%stiffness, rod%bubble])
       end associate
    end function new_bending_matrices
 

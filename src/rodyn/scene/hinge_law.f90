@@ -57,9 +57,10 @@ module rodyn_hinge_law
 contains
 
    !> Take over the hinges of a chain; factor the three-moment equation if bending is quasistatic.
-   subroutine new_hinge_law(law, chain, quasistatic, exact_dampers, driven, hinges)
+   subroutine new_hinge_law(law, chain, flexibility, quasistatic, exact_dampers, driven, hinges)
       type(hinge_law), intent(out) :: law
       type(chain_config), intent(in) :: chain
+      real(wp), intent(in) :: flexibility(:, :) !! of the rods (3, n), read when quasistatic (`rodyn_rod_bending`)
       logical, intent(in) :: quasistatic
       logical, intent(in) :: exact_dampers !! matters only when quasistatic
       logical, intent(in) :: driven !! some kink will move
@@ -81,7 +82,7 @@ contains
       law%driven = driven
       given = quasistatic .and. exact_dampers .and. law%damping > 0.0_wp
       law%relaxing = pack([(k, k=0, law%n - 1)], given)
-      if (quasistatic) law%series%slope = chain%length/(6.0_wp*chain%bending_stiffness)
+      if (quasistatic) law%series%flexibility = flexibility
       allocate (law%mechanisms(0))
       if (present(hinges)) then
          deallocate (law%mechanisms)
@@ -110,7 +111,7 @@ contains
       if (self%quasistatic) then
          given = self%locked
          given(self%relaxing) = .true.
-         call new_three_moments(series, self%stiffness, self%series%slope, given)
+         call new_three_moments(series, self%stiffness, self%series%flexibility, given)
          self%series = series
          call bend_rods(self)
       end if
@@ -138,11 +139,11 @@ contains
 
       opening = 0.0_wp
       do k = 1, self%n
-         associate (slope => self%series%slope(k))
-            opening(k - 1) = opening(k - 1) + 2.0_wp*slope*moment(k - 1)
+         associate (f => self%series%flexibility(:, k))
+            opening(k - 1) = opening(k - 1) + f(1)*moment(k - 1)
             if (k == self%n) cycle
-            opening(k - 1) = opening(k - 1) + slope*moment(k)
-            opening(k) = opening(k) + slope*(moment(k - 1) + 2.0_wp*moment(k))
+            opening(k - 1) = opening(k - 1) + f(2)*moment(k)
+            opening(k) = opening(k) + (f(2)*moment(k - 1) + f(3)*moment(k))
          end associate
       end do
    end subroutine bend_by
@@ -180,7 +181,7 @@ contains
       self%held_at = spread(0.0_wp, 1, size(self%held))
       if (present(theta)) self%held_at = theta(self%held)
       given = locked .or. state
-      call new_three_moments(series, self%stiffness, self%series%slope, given)
+      call new_three_moments(series, self%stiffness, self%series%flexibility, given)
       self%series = series
       call bend_rods(self)
    end subroutine lock
@@ -411,14 +412,22 @@ contains
    end subroutine relaxation_tangent
 
    !> A bound of the rates at which relaxing hinges follow [1/s]: (C + 1/F_min)/D, F_min the smallest eigenvalue of the
-   !> flexibility of the rods, by Gershgorin at least the smallest l/(6 EI).
+   !> flexibility of the rods, at least that of the stiffest rod: l/(6 EI) if uniform.
    pure real(wp) function fastest_relaxation(self)
       class(hinge_law), intent(in) :: self
       fastest_relaxation = 0.0_wp
       if (size(self%relaxing) == 0) return
-      fastest_relaxation = maxval((self%stiffness(self%relaxing) + 1.0_wp/minval(self%series%slope))/ &
-                                  self%damping(self%relaxing))
+      associate (f => self%series%flexibility)
+         fastest_relaxation = maxval((self%stiffness(self%relaxing) + 1.0_wp/minval(softness(f)))/self%damping(self%relaxing))
+      end associate
    end function fastest_relaxation
+
+   !> Smaller eigenvalue of the flexibility of each rod [1/(N m)].
+   pure function softness(f)
+      real(wp), intent(in) :: f(:, :) !! f11, f12, f22 (3, n)
+      real(wp) :: softness(size(f, 2))
+      softness = 0.5_wp*(f(1, :) + f(3, :) - sqrt((f(1, :) - f(3, :))**2 + 4.0_wp*f(2, :)**2))
+   end function softness
 
    !> Rotations of the relaxing hinges at the start: those of springs and rods in balance, dampers at rest.
    subroutine initial_joints(law, phi, theta)
@@ -428,7 +437,7 @@ contains
       type(three_moments) :: undamped
       real(wp) :: all_joints(0:law%n - 1), bent(0:law%n - 1)
 
-      call new_three_moments(undamped, law%stiffness, law%series%slope, spread(.false., 1, law%n))
+      call new_three_moments(undamped, law%stiffness, law%series%flexibility, spread(.false., 1, law%n))
       call openings(law%n, .false., phi, all_joints)
       call bend_by(law, law%constant, bent)
       all_joints = all_joints - (law%kink + bent)

@@ -3,7 +3,7 @@ module rodyn_quadrature
    use rodyn_kinds, only: wp
    implicit none (type, external)
    private
-   public :: gauss_rule, new_gauss_rule
+   public :: gauss_rule, new_gauss_rule, composite_rule
 
    !> Points and weights on [0, 1]; exact for polynomials up to degree 2 n - 1.
    type :: gauss_rule
@@ -43,6 +43,23 @@ contains
          rule%weights(n + 1 - i) = rule%weights(i)
       end do
    end subroutine new_gauss_rule
+
+   !> The rule on every piece between neighbouring breaks: exact for what is a polynomial on each of them.
+   pure function composite_rule(rule, breaks) result(whole)
+      type(gauss_rule), intent(in) :: rule
+      real(wp), intent(in) :: breaks(:) !! rising from 0 to 1
+      type(gauss_rule) :: whole
+      integer :: i, n
+
+      n = size(rule%points)
+      allocate (whole%points(n*(size(breaks) - 1)), whole%weights(n*(size(breaks) - 1)))
+      do i = 1, size(breaks) - 1
+         associate (from => breaks(i), width => breaks(i + 1) - breaks(i))
+            whole%points((i - 1)*n + 1:i*n) = from + width*rule%points
+            whole%weights((i - 1)*n + 1:i*n) = width*rule%weights
+         end associate
+      end do
+   end function composite_rule
 
    !> P_n(x) and P_n'(x) by the three-term recurrence, |x| < 1.
    pure subroutine legendre(n, x, value, slope)

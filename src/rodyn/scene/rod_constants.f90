@@ -1,8 +1,10 @@
 !> Constants of one distinct rod, as the kernels read them.
 module rodyn_rod_constants
    use rodyn_kinds, only: wp
-   use rodyn_quadrature, only: gauss_rule
+   use rodyn_quadrature, only: gauss_rule, new_gauss_rule, composite_rule
+   use rodyn_rod_bending, only: slope_stiffness, slope_flexibility, inverse_of_flexibility
    use rodyn_rod_integrals, only: rod_integrals, new_rod_integrals, bubble_stiffness
+   use rodyn_rod_profile, only: rod_profile
    implicit none (type, external)
    private
    public :: rod_constants, new_rod_constants
@@ -14,10 +16,13 @@ module rodyn_rod_constants
    !> A lumped rod has no inertia at all; a rigid one has m0, m1, m2 only (its reduced inertias are those).
    type :: rod_constants
       real(wp) :: length = 0.0_wp            !! l [m]
-      real(wp) :: bending_stiffness = 0.0_wp !! EI [N m^2]
-      real(wp) :: kappa = 0.0_wp             !! 2 EI / l: elastic energy is kappa (alpha^2 + alpha beta + beta^2) [N m]
+      real(wp) :: bending_stiffness = 0.0_wp !! EI, where it varies what the profile multiplies [N m^2]
+      real(wp) :: stiffness(3) = 0.0_wp      !! k11, k12, k22 of the slopes, (2 EI/l)(2, 1, 2) if uniform [N m]
+      real(wp) :: carry_over(2) = 0.5_wp     !! k12/k11, k12/k22 (Cross): 1/2 if uniform
+      real(wp) :: flexibility(3) = 0.0_wp    !! f11, f12, f22 of a rod that bends without inertia [1/(N m)]
       type(rod_integrals) :: inertia         !! all zero when lumped; shape integrals zero when rigid
       real(wp) :: bubble(3) = 0.0_wp         !! int EI N'' Nc'' with Na, Nb, Nc
+      real(wp) :: share(2) = 0.0_wp          !! mass that goes to the inner and the outer node when lumped [kg]
       real(wp) :: second(3) = 0.0_wp         !! aa, ab, bb where they are of second order: zero in `paper`
       real(wp) :: b_inverse(3) = 0.0_wp      !! B^-1: (1,1), (1,2), (2,2) [1/(kg m^2)]
       real(wp) :: g(2) = 0.0_wp              !! [1/m]
@@ -34,30 +39,28 @@ module rodyn_rod_constants
 
 contains
 
-   !> Constants of a rod of constant mass per length.
+   !> Constants of a rod. Profiles multiply its mass per length and its bending stiffness; without them it is uniform.
    pure subroutine new_rod_constants(rod, length, mass_per_length, bending_stiffness, rule, lumped, flexible, &
-                                     consistent, ok)
+                                     consistent, ok, mass_profile, stiffness_profile)
       type(rod_constants), intent(out) :: rod
       real(wp), intent(in) :: length            !! l [m]
       real(wp), intent(in) :: mass_per_length   !! m [kg/m]
-      real(wp), intent(in) :: bending_stiffness !! EI [N m^2]; ignored for rigid rods
-      type(gauss_rule), intent(in) :: rule      !! for the integrals
+      real(wp), intent(in) :: bending_stiffness !! EI [N m^2]; 0 for rigid rods
+      type(gauss_rule), intent(in) :: rule      !! for the integrals of a uniform rod
       logical, intent(in) :: lumped             !! its mass stands in the nodes
       logical, intent(in) :: flexible           !! alpha, beta have inertia
       logical, intent(in) :: consistent         !! keep second-order inertia
-      logical, intent(out) :: ok                !! false: B is not positive definite
-      real(wp) :: mass(size(rule%points))
+      logical, intent(out) :: ok                !! false: B, or the stiffness of the slopes, is not positive definite
+      type(rod_profile), intent(in), optional :: mass_profile, stiffness_profile
 
       ok = .true.
       rod%length = length
       rod%length_2 = length**2
       rod%bending_stiffness = bending_stiffness
-      rod%kappa = 2.0_wp*bending_stiffness/length
-      if (lumped) return
-      mass = mass_per_length
-      rod%inertia = new_rod_integrals(length, mass, rule)
+      if (bending_stiffness > 0.0_wp) call resist_bending(rod, rule, flexible, ok, stiffness_profile)
+      call integrate_mass(rod, mass_per_length, rule, lumped, mass_profile)
+      if (lumped .or. .not. ok) return
       if (flexible) then
-         rod%bubble = bubble_stiffness(length, spread(bending_stiffness, 1, size(rule%points)), rule)
          if (consistent) rod%second = [rod%inertia%aa, rod%inertia%ab, rod%inertia%bb]
          call reduce(rod, ok)
       else
@@ -73,6 +76,72 @@ contains
       rod%offset = length*rod%m0_reduced - rod%m1_reduced
       rod%outer = rod%m2_reduced - 2.0_wp*length*rod%m1_reduced + length**2*rod%m0_reduced
    end subroutine new_rod_constants
+
+   !> Stiffness of the slopes, and flexibility where they have no inertia.
+   pure subroutine resist_bending(rod, rule, flexible, ok, profile)
+      type(rod_constants), intent(inout) :: rod
+      type(gauss_rule), intent(in) :: rule
+      logical, intent(in) :: flexible
+      logical, intent(out) :: ok !! stiffness positive definite
+      type(rod_profile), intent(in), optional :: profile
+      type(gauss_rule) :: finer
+
+      associate (l => rod%length, ei => rod%bending_stiffness, k => rod%stiffness, f => rod%flexibility)
+         if (.not. is_varying(profile)) then
+            k = (2.0_wp*ei/l)*[2.0_wp, 1.0_wp, 2.0_wp]
+            f = l/(6.0_wp*ei)*[2.0_wp, 1.0_wp, 2.0_wp]
+            rod%bubble = bubble_stiffness(l, spread(ei, 1, size(rule%points)), rule)
+         else if (flexible) then
+            finer = rule_for(profile, rule)
+            k = slope_stiffness(l, ei, profile, finer)
+            rod%bubble = bubble_stiffness(l, ei*profile%at(finer%points), finer)
+         else
+            f = slope_flexibility(l, ei, profile)
+            k = inverse_of_flexibility(f)
+         end if
+         ok = min(k(1), k(3)) > 0.0_wp .and. k(1)*k(3) > k(2)**2
+         if (ok) rod%carry_over = k(2)/[k(1), k(3)]
+      end associate
+   end subroutine resist_bending
+
+   !> Integrals over the mass, or what of it goes to the nodes: half, or what keeps the centre of mass in its place.
+   pure subroutine integrate_mass(rod, mass_per_length, rule, lumped, profile)
+      type(rod_constants), intent(inout) :: rod
+      real(wp), intent(in) :: mass_per_length
+      type(gauss_rule), intent(in) :: rule
+      logical, intent(in) :: lumped
+      type(rod_profile), intent(in), optional :: profile
+      type(gauss_rule) :: finer
+
+      if (is_varying(profile)) then
+         finer = rule_for(profile, rule)
+         rod%inertia = new_rod_integrals(rod%length, mass_per_length*profile%at(finer%points), finer)
+         associate (i => rod%inertia)
+            rod%share = [i%m0 - i%m1/rod%length, i%m1/rod%length]
+         end associate
+      else if (lumped) then
+         rod%share = 0.5_wp*rod%length*mass_per_length
+      else
+         rod%inertia = new_rod_integrals(rod%length, spread(mass_per_length, 1, size(rule%points)), rule)
+      end if
+      if (lumped) rod%inertia = rod_integrals()
+   end subroutine integrate_mass
+
+   pure logical function is_varying(profile)
+      type(rod_profile), intent(in), optional :: profile
+      is_varying = .false.
+      if (present(profile)) is_varying = profile%varies()
+   end function is_varying
+
+   !> The rule with as many points more as the degree of the profile asks for, on each of its pieces.
+   pure function rule_for(profile, rule) result(finer)
+      type(rod_profile), intent(in) :: profile
+      type(gauss_rule), intent(in) :: rule
+      type(gauss_rule) :: finer
+      type(gauss_rule) :: piece
+      call new_gauss_rule(piece, size(rule%points) + (profile%degree() + 1)/2)
+      finer = composite_rule(piece, profile%breaks())
+   end function rule_for
 
    !> Eliminate alpha'', beta'' from the inertia of a rod, MODEL sec. 4.
    pure subroutine reduce(rod, ok)

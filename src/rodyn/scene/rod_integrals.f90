@@ -4,7 +4,8 @@ module rodyn_rod_integrals
    use rodyn_quadrature, only: gauss_rule
    implicit none (type, external)
    private
-   public :: rod_integrals, new_rod_integrals, shape_alpha, shape_beta, shape_bubble, bubble_stiffness
+   public :: rod_integrals, new_rod_integrals, shape_alpha, shape_beta, shape_bubble, curvature_alpha, curvature_beta
+   public :: bubble_stiffness
 
    !> Integrals over one rod, 0 <= s <= l; m(s) is its mass per length.
    type :: rod_integrals
@@ -48,6 +49,27 @@ contains
       shape_bubble = 16.0_wp*((s/length)*(1.0_wp - s/length))**2
    end function shape_bubble
 
+   !> Na'' = (6 s/l - 4)/l [1/m].
+   elemental real(wp) function curvature_alpha(s, length)
+      real(wp), intent(in) :: s      !! arc length from the inner node [m]
+      real(wp), intent(in) :: length !! l [m]
+      curvature_alpha = (6.0_wp*s/length - 4.0_wp)/length
+   end function curvature_alpha
+
+   !> Nb'' = (6 s/l - 2)/l [1/m].
+   elemental real(wp) function curvature_beta(s, length)
+      real(wp), intent(in) :: s      !! arc length from the inner node [m]
+      real(wp), intent(in) :: length !! l [m]
+      curvature_beta = (6.0_wp*s/length - 2.0_wp)/length
+   end function curvature_beta
+
+   !> Nc'' = 32 (1 - 6 s/l + 6 (s/l)^2)/l^2 [1/m^2].
+   elemental real(wp) function curvature_bubble(s, length)
+      real(wp), intent(in) :: s      !! arc length from the inner node [m]
+      real(wp), intent(in) :: length !! l [m]
+      curvature_bubble = 32.0_wp*(1.0_wp - 6.0_wp*(s/length)*(1.0_wp - s/length))/length**2
+   end function curvature_bubble
+
    !> All integrals of a rod by a Gauss rule. The mass per length may vary along the rod: it is given at the
    !> points of the rule. A constant one needs 4 points (Na^2 has degree 6),
    !> or 5 with the bubble (Nc^2 has degree 8).
@@ -87,14 +109,13 @@ contains
       real(wp), intent(in) :: bending_stiffness(:) !! EI at s = l*rule%points (points) [N m^2]
       type(gauss_rule), intent(in) :: rule         !! on [0, 1]
       real(wp) :: integrals(3)
-      real(wp), dimension(size(rule%points)) :: bent
+      real(wp), dimension(size(rule%points)) :: s, moment
 
-      associate (x => rule%points)
-         bent = length*rule%weights*bending_stiffness*32.0_wp/length**2*(1.0_wp - 6.0_wp*x + 6.0_wp*x**2)
-         integrals(1) = sum(bent*(6.0_wp*x - 4.0_wp)/length)
-         integrals(2) = sum(bent*(6.0_wp*x - 2.0_wp)/length)
-         integrals(3) = sum(bent*32.0_wp/length**2*(1.0_wp - 6.0_wp*x + 6.0_wp*x**2))
-      end associate
+      s = length*rule%points
+      moment = length*rule%weights*bending_stiffness*curvature_bubble(s, length)
+      integrals(1) = sum(moment*curvature_alpha(s, length))
+      integrals(2) = sum(moment*curvature_beta(s, length))
+      integrals(3) = sum(moment*curvature_bubble(s, length))
    end function bubble_stiffness
 
 end module rodyn_rod_integrals

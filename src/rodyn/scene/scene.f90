@@ -12,6 +12,7 @@ module rodyn_scene
    use rodyn_quadrature, only: gauss_rule, new_gauss_rule
    use rodyn_rod_constants, only: rod_constants, new_rod_constants
    use rodyn_bending_matrices, only: bending_matrices, new_bending_matrices, most_shapes
+   use rodyn_rod_profile, only: rod_profile, new_rod_profile
    use rodyn_spacecraft, only: spacecraft_body
    use rodyn_hinge_law, only: hinge_law, new_hinge_law
    use rodyn_loads, only: load_set, new_load_set
@@ -104,6 +105,7 @@ contains
       type(scene_type), intent(out) :: scene
       type(case_config), intent(in) :: config
       type(error_type), allocatable, intent(out) :: error
+      integer :: k
 
       call check_combination(config, error)
       if (allocated(error)) return
@@ -124,7 +126,8 @@ contains
       call compile_nodes(scene, config, error)
       if (allocated(error)) return
       call new_kink_set(scene%kinks, config%chain%kink, config%kink_programs, config%t_end)
-      call new_hinge_law(scene%hinges, config%chain, scene%quasistatic, config%model%dampers == 'exact', &
+      call new_hinge_law(scene%hinges, config%chain, reshape([(scene%rods(scene%rod_of(k))%flexibility, k=1, scene%n)], &
+                                                             [3, scene%n]), scene%quasistatic, config%model%dampers == 'exact', &
                          size(scene%kinks%programs) > 0, config%hinges)
       scene%n_q = scene%n_dof + size(scene%hinges%relaxing)
       call new_load_set(scene%loads, config%loads, config%t_end)
@@ -171,30 +174,33 @@ contains
       end associate
    end subroutine check_combination
 
-   !> Integrals and derived constants, once per distinct (length, mass per length, stiffness).
+   !> Integrals and derived constants, once per distinct (length, mass per length, stiffness, profiles).
    subroutine compile_rods(scene, config, error)
       type(scene_type), intent(inout) :: scene
       type(case_config), intent(in) :: config
       type(error_type), allocatable, intent(out) :: error
       type(gauss_rule) :: rule
       type(rod_constants), allocatable :: rods(:)
-      integer, allocatable :: first(:)
+      type(rod_profile), allocatable :: profiles(:)
+      integer, allocatable :: first(:), profile_of(:, :)
       character(len=12) :: number
       logical :: ok
       integer :: j, n_distinct
 
-      call find_distinct(config, scene%rod_of, first)
+      call find_profiles(config, profiles, profile_of)
+      call find_distinct(config, profile_of, scene%rod_of, first)
       n_distinct = size(first)
       call new_gauss_rule(rule, config%model%gauss_points)
       allocate (rods(n_distinct), scene%bending(n_distinct))
       do j = 1, n_distinct
          associate (k => first(j), chain => config%chain)
             call new_rod_constants(rods(j), chain%length(k), chain%mass_per_length(k), stiffness_of(k), rule, &
-                                   scene%lumped, scene%dynamic_bending, scene%consistent, ok)
+                                   scene%lumped, scene%dynamic_bending, scene%consistent, ok, &
+                                   profiles(profile_of(1, k)), profiles(profile_of(2, k)))
             if (.not. ok) then
                write (number, '(i0)') k
-               call raise(error, '&chain: rod '//trim(number)//' has no bending inertia: dynamic bending needs '// &
-                          'mass_per_length > 0 and gauss_points >= 2', exit_bad_input)
+               call raise(error, '&chain: rod '//trim(number)//' has no bending inertia or stiffness: dynamic bending needs '// &
+                          'mass_per_length > 0, bending_stiffness > 0 and gauss_points >= 2', exit_bad_input)
                return
             end if
             scene%bending(j) = new_bending_matrices(rods(j), scene%n_bend, scene%consistent)
@@ -212,10 +218,42 @@ contains
 
    end subroutine compile_rods
 
+   !> The distinct profiles, the first of them uniform, and which of them each rod has: for its mass per length in row 1,
+   !> for its bending stiffness in row 2. Where several are given for a rod, the last one counts.
+   subroutine find_profiles(config, profiles, profile_of)
+      type(case_config), intent(in) :: config
+      type(rod_profile), allocatable, intent(out) :: profiles(:)
+      integer, allocatable, intent(out) :: profile_of(:, :) !! (2, n)
+      type(rod_profile), allocatable :: found(:)
+      integer :: i, j, n_found, n_given
+
+      n_given = 0
+      if (allocated(config%profiles)) n_given = size(config%profiles)
+      allocate (found(n_given + 1))
+      allocate (profile_of(2, config%chain%n_rods), source=1)
+      n_found = 1
+      do i = 1, n_given
+         associate (given => config%profiles(i))
+            call new_rod_profile(found(n_found + 1), given)
+            do j = 1, n_found
+               if (found(j)%equals(found(n_found + 1))) exit
+            end do
+            n_found = max(n_found, j)
+            if (given%quantity == 'mass_per_length') then
+               profile_of(1, given%first_rod:min(config%chain%n_rods, given%last_rod)) = j
+            else if (config%model%bending /= 'rigid') then
+               profile_of(2, given%first_rod:min(config%chain%n_rods, given%last_rod)) = j
+            end if
+         end associate
+      end do
+      profiles = found(:n_found)
+   end subroutine find_profiles
+
    !> Number the distinct rods: `rod_of(k)` is the number of rod k, `first(j)` one rod of number j.
    !> A sort by value keeps this O(n log n) when all rods differ.
-   subroutine find_distinct(config, rod_of, first)
+   subroutine find_distinct(config, profile_of, rod_of, first)
       type(case_config), intent(in) :: config
+      integer, intent(in) :: profile_of(:, :)        !! (2, n)
       integer, allocatable, intent(out) :: rod_of(:) !! (n)
       integer, allocatable, intent(out) :: first(:)  !! (number of distinct rods)
       integer, allocatable :: order(:)
@@ -223,10 +261,11 @@ contains
       integer :: i, n, n_distinct
 
       n = config%chain%n_rods
-      allocate (key(3, n), source=0.0_wp)
+      allocate (key(5, n), source=0.0_wp)
       key(1, :) = config%chain%length
       key(2, :) = config%chain%mass_per_length
       if (config%model%bending /= 'rigid') key(3, :) = config%chain%bending_stiffness
+      key(4:5, :) = profile_of
       order = sorted_order(key)
       allocate (rod_of(n), first(n))
       n_distinct = 0
@@ -299,13 +338,12 @@ contains
       end do
    end function precedes
 
-   !> Node masses, with half of each rod's mass at its two nodes when lumped. Every apparent mass that the
+   !> Node masses, with the mass of each rod shared by its two nodes when lumped. Every apparent mass that the
    !> recursion divides by must be positive, so no rod and node may both be without mass.
    subroutine compile_nodes(scene, config, error)
       type(scene_type), intent(inout) :: scene
       type(case_config), intent(in) :: config
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: half_rod
       character(len=12) :: number
       integer :: k
 
@@ -313,9 +351,9 @@ contains
       scene%node_mass(1:) = config%chain%node_mass
       if (scene%lumped) then
          do k = 1, scene%n
-            half_rod = 0.5_wp*config%chain%length(k)*config%chain%mass_per_length(k)
-            scene%node_mass(k - 1) = scene%node_mass(k - 1) + half_rod
-            scene%node_mass(k) = scene%node_mass(k) + half_rod
+            associate (share => scene%rods(scene%rod_of(k))%share)
+               scene%node_mass(k - 1:k) = scene%node_mass(k - 1:k) + share
+            end associate
          end do
       end if
       do k = 1, scene%n

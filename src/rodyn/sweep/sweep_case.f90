@@ -10,10 +10,14 @@ module rodyn_sweep_case
    use rodyn_integrator, only: integrator_type, monitor_type, solver_statistics
    use rodyn_integrators, only: new_integrator
    use rodyn_ledger, only: fill_row
+   use rodyn_linear_model, only: linear_model
    use rodyn_method_choice, only: method_choice, choose_method
+   use rodyn_modal_analysis, only: modes_at_start
+   use rodyn_modes, only: mode_set
    use rodyn_motion, only: motion_type, new_motion, initial_state
    use rodyn_namelist_document, only: namelist_document
    use rodyn_namelist_edit, only: set_value
+   use rodyn_rod_profile, only: mean_mass_factors
    use rodyn_run, only: options_of
    use rodyn_run_file, only: run_row, new_run_row
    use rodyn_scene, only: scene_type, new_scene
@@ -23,7 +27,7 @@ module rodyn_sweep_case
    implicit none (type, external)
    private
    public :: case_result, case_shape, pulse_type, keeper_type, build_case, build_values, new_case_shape
-   public :: clear_result, prepare_case, integrate_case, keep_final, conclude_case
+   public :: allocate_result, clear_result, prepare_case, integrate_case, keep_final, conclude_case
    public :: status_done, status_failed, status_stopped
 
    integer, parameter :: status_done = 1, status_failed = 2
@@ -32,8 +36,10 @@ module rodyn_sweep_case
    !> Sizes that all cases of a sweep have in common.
    type :: case_shape
       integer :: n_rods = 0   !! of the longest chain; shorter ones end in NaN
+      integer :: n_modes = 0  !! natural frequencies that are kept
       integer :: n_per_rod = 6 !! phi, alpha, beta, their rates; 8: and bubble and its rate, if some case has them
-      integer :: n_states = 0 !! n_per_rod n_rods + 6: those, then velocity, displacement and rotation
+      integer :: n_states = 0 !! n_per_rod n_rods + 6: those, then velocity, displacement and rotation; 0 where nothing is
+                              !! integrated
       integer :: n_probes = 0
       integer :: n_rows = 0   !! of the longest series; 0: no series are kept
       logical :: outputs = .false. !! the states at the n_outputs times are made, whether they are kept or not
@@ -49,6 +55,8 @@ module rodyn_sweep_case
       real(wp) :: wall_seconds = 0.0_wp       !! whole case
       real(wp) :: integration_seconds = 0.0_wp !! of them, inside the integration
       character(len=:), allocatable :: message
+      real(wp), allocatable :: frequency(:)   !! natural frequencies (n_modes) [rad/s]; NaN beyond the last
+      real(wp), allocatable :: damping_ratio(:) !! (n_modes)
       real(wp), allocatable :: final(:)       !! (n_states)
       real(wp), allocatable :: probes(:, :)   !! (n_states, n_probes); NaN beyond the end of the case
       real(wp), allocatable :: times(:)       !! (n_rows) [s]; NaN beyond the last row
@@ -102,6 +110,7 @@ contains
       type(sweep_config), intent(in) :: sweep
       integer :: a, n_outputs
 
+      shape%n_modes = sweep%frequencies
       shape%n_rods = sweep%base_case%chain%n_rods
       if (sweep%base_case%model%bending_shapes == 3) shape%n_per_rod = 8
       n_outputs = sweep%base_case%n_outputs
@@ -118,6 +127,7 @@ contains
          case default ! changes no size
          end select
       end do
+      if (.not. sweep%integrate) return
       shape%n_states = shape%n_per_rod*shape%n_rods + 6
       shape%n_probes = size(sweep%probe_times)
       if (sweep%keep_series) shape%n_rows = n_outputs + 1
@@ -150,7 +160,7 @@ contains
       do a = 1, size(sweep%axes)
          associate (axis => sweep%axes(a), chain => config%chain)
             if (is_ratio(axis)) chain%node_mass(:) = axis%numbers(rows(axis%dimension))* &
-               sum(chain%length*chain%mass_per_length)/chain%n_rods
+               sum(chain%length*chain%mass_per_length*mean_mass_factors(chain%n_rods, config%profiles))/chain%n_rods
          end associate
       end do
    end subroutine build_values
@@ -193,18 +203,22 @@ contains
       end if
    end subroutine follow_inertia
 
+   !> Memory for what is kept of a case.
+   subroutine allocate_result(kept, shape)
+      type(case_result), intent(inout) :: kept
+      type(case_shape), intent(in) :: shape
+      allocate (kept%frequency(shape%n_modes), kept%damping_ratio(shape%n_modes), kept%final(shape%n_states))
+      allocate (kept%probes(shape%n_states, shape%n_probes))
+      allocate (kept%times(shape%n_rows), kept%series(shape%n_states, shape%n_rows))
+   end subroutine allocate_result
+
    !> Ready for a case.
    subroutine clear_result(kept, shape, case)
       type(case_result), intent(inout) :: kept
       type(case_shape), intent(in) :: shape
       integer, intent(in) :: case
 
-      if (.not. allocated(kept%final)) then
-         allocate (kept%final(shape%n_states))
-         allocate (kept%probes(shape%n_states, shape%n_probes))
-         allocate (kept%times(shape%n_rows))
-         allocate (kept%series(shape%n_states, shape%n_rows))
-      end if
+      if (.not. allocated(kept%final)) call allocate_result(kept, shape)
       kept%case = case
       kept%attempt = 1
       kept%n_steps = 0
@@ -219,13 +233,15 @@ contains
       type(case_result), intent(inout) :: kept
       real(wp) :: nan
       nan = ieee_value(0.0_wp, ieee_quiet_nan)
+      kept%frequency = nan
+      kept%damping_ratio = nan
       kept%final = nan
       kept%probes = nan
       kept%times = nan
       kept%series = nan
    end subroutine make_nan
 
-   !> Everything about a case that comes before its integration. `keeper%kept` is the caller's to set.
+   !> Everything about a case that comes before its integration, frequencies among it. `keeper%kept` is the caller's to set.
    subroutine prepare_case(sweep, plan, shape, case, motion, y, times, t_end, keeper, choice, error)
       type(sweep_config), intent(in) :: sweep
       type(sweep_plan), intent(in) :: plan
@@ -247,6 +263,8 @@ contains
       if (.not. allocated(error)) call new_motion(motion, scene, .false., error)
       if (allocated(error)) return
       t_end = config%t_end
+      if (sweep%frequencies > 0) call keep_frequencies(scene, config, keeper%kept, error)
+      if (allocated(error) .or. .not. sweep%integrate) return
       motion%events%most = config%solver%max_events
       call initial_state(motion, config%initial, y)
       call choose_method(choice, config%solver, options_of(config), scene, y, t_end)
@@ -255,6 +273,31 @@ contains
       keeper%keep_series = sweep%keep_series
       call merge_times(config, sweep%probe_times, shape%outputs, times, keeper%probe_of, keeper%output_of)
    end subroutine prepare_case
+
+   !> The lowest natural frequencies at the initial state, rigid bodies and mechanisms left out.
+   subroutine keep_frequencies(scene, config, kept, error)
+      type(scene_type), intent(in) :: scene
+      type(case_config), intent(in) :: config
+      type(case_result), intent(inout) :: kept
+      type(error_type), allocatable, intent(out) :: error
+      type(motion_type) :: motion !! of its own: matrices would stay with the one that is integrated
+      type(linear_model) :: model
+      type(mode_set) :: modes
+      integer, allocatable :: which(:)
+      real(wp), allocatable :: frequency(:), ratio(:)
+      integer :: n
+
+      call new_motion(motion, scene, .false., error)
+      if (.not. allocated(error)) call modes_at_start(motion, config, equilibrium=.false., loads=.false., with_shapes=.false., &
+                                                     model=model, modes=modes, error=error)
+      if (allocated(error)) return
+      which = modes%oscillations()
+      n = min(size(which), size(kept%frequency))
+      frequency = modes%frequency()
+      ratio = modes%damping_ratio()
+      kept%frequency(:n) = frequency(which(:n))
+      kept%damping_ratio(:n) = ratio(which(:n))
+   end subroutine keep_frequencies
 
    !> Integrate a prepared case by itself, and keep what is wanted.
    subroutine integrate_case(sweep, choice, times, t_end, pulse, clock_start, motion, y, keeper, late, error)

@@ -10,7 +10,7 @@ module rodyn_sweep_engine
    use rodyn_lapack, only: use_one_thread
    use rodyn_posix, only: ignore_file_size_signal, path_exists
    use rodyn_posix_files, only: stop_signal, watch_signals, write_text_file
-   use rodyn_sweep_case, only: case_result, case_shape, new_case_shape, status_done, status_failed, status_stopped
+   use rodyn_sweep_case, only: allocate_result, case_result, case_shape, new_case_shape, status_done, status_failed, status_stopped
    use rodyn_sweep_config, only: sweep_config
    use rodyn_sweep_directory, only: sweep_directory, result_name
    use rodyn_sweep_forecast, only: print_forecast
@@ -530,8 +530,7 @@ contains
 
       shown = 0
       integration = 0.0_wp
-      allocate (kept%final(engine%shape%n_states), kept%probes(engine%shape%n_states, engine%shape%n_probes))
-      allocate (kept%times(engine%shape%n_rows), kept%series(engine%shape%n_states, engine%shape%n_rows))
+      call allocate_result(kept, engine%shape)
       if (counts%failed > 0) then
          do i = 1, engine%plan%n_cases
             if (index%status(i) /= status_failed) cycle

@@ -12,7 +12,7 @@ module rodyn_sweep_merge
    use rodyn_posix, only: ignore_file_size_signal, path_exists, remove_file, sync_path
    use rodyn_run_layout, only: i_alpha, i_alpha_rate, i_beta, i_beta_rate, i_bubble, i_bubble_rate, i_displacement_x, &
       i_displacement_y, i_omega, i_phi, i_phi_rate, i_rotation, i_velocity_x, i_velocity_y, run_variables
-   use rodyn_sweep_case, only: case_result, case_shape, status_done
+   use rodyn_sweep_case, only: allocate_result, case_result, case_shape, status_done
    use rodyn_sweep_config, only: sweep_config
    use rodyn_sweep_index, only: sweep_index
    use rodyn_sweep_plan, only: sweep_plan
@@ -32,6 +32,7 @@ module rodyn_sweep_merge
    !> Results of consecutive cases
    type :: case_block
       integer :: n = 0
+      real(wp), allocatable :: frequency(:, :), damping_ratio(:, :) !! (mode, case)
       real(wp), allocatable :: final(:, :)      !! (state, case)
       real(wp), allocatable :: probes(:, :, :)  !! (state, probe, case)
       real(wp), allocatable :: times(:, :)      !! (row, case)
@@ -109,7 +110,7 @@ contains
       type(case_shape), intent(in) :: shape
       integer, intent(in) :: n_cases
       integer :: numbers
-      numbers = shape%n_states*(1 + shape%n_probes + shape%n_rows) + shape%n_rows + 1
+      numbers = 2*shape%n_modes + shape%n_states*(1 + shape%n_probes + shape%n_rows) + shape%n_rows + 1
       n = max(1, min(n_cases, most_block_cases, block_bytes/(8*numbers)))
    end function cases_per_block
 
@@ -118,13 +119,13 @@ contains
       type(case_result), intent(out) :: kept
       type(case_shape), intent(in) :: shape
       integer, intent(in) :: n
+      allocate (block%frequency(shape%n_modes, n), block%damping_ratio(shape%n_modes, n))
       allocate (block%final(shape%n_states, n), block%probes(shape%n_states, shape%n_probes, n))
       allocate (block%times(shape%n_rows, n), block%series(shape%n_states, shape%n_rows, n))
       allocate (block%t_reached(n), block%wall_seconds(n))
       allocate (block%n_steps(n), block%n_rhs(n), block%same_as(n), block%number(n))
       allocate (block%status(n), block%message(n))
-      allocate (kept%final(shape%n_states), kept%probes(shape%n_states, shape%n_probes))
-      allocate (kept%times(shape%n_rows), kept%series(shape%n_states, shape%n_rows))
+      call allocate_result(kept, shape)
    end subroutine new_block
 
    !> Fetch the results of cases first, first + 1, ...
@@ -146,11 +147,15 @@ contains
          call index%fetch(source, shape, kept, error)
          if (allocated(error)) return
          if (kept%status /= status_done) then
+            kept%frequency = nan
+            kept%damping_ratio = nan
             kept%final = nan
             kept%probes = nan
             kept%times = nan
             kept%series = nan
          end if
+         block%frequency(:, i) = kept%frequency
+         block%damping_ratio(:, i) = kept%damping_ratio
          block%final(:, i) = kept%final
          block%probes(:, :, i) = kept%probes
          block%times(:, i) = kept%times
@@ -204,10 +209,16 @@ contains
       type(error_type), allocatable, intent(out) :: error
       integer :: a, i
 
-      call file%write('probe_time', sweep%probe_times, compression, error)
-      call describe('probe_time', 's', 'time at which the state of each case is kept')
-      if (.not. allocated(error)) call file%write('rod', [(i, i=1, shape%n_rods)], compression, error)
-      call describe('rod', '1', 'rod, counted from the spacecraft')
+      if (shape%n_states > 0) then
+         call file%write('probe_time', sweep%probe_times, compression, error)
+         call describe('probe_time', 's', 'time at which the state of each case is kept')
+         if (.not. allocated(error)) call file%write('rod', [(i, i=1, shape%n_rods)], compression, error)
+         call describe('rod', '1', 'rod, counted from the spacecraft')
+      end if
+      if (shape%n_modes > 0) then
+         if (.not. allocated(error)) call file%write('mode', [(i, i=1, shape%n_modes)], compression, error)
+         call describe('mode', '1', 'oscillation at the initial state, by rising natural frequency')
+      end if
       if (shape%n_rows > 0) then
          if (.not. allocated(error)) call file%write('row', [(i - 1, i=1, shape%n_rows)], compression, error)
          call describe('row', '1', 'output time of a case, counted from its start')
@@ -228,6 +239,11 @@ contains
       call make('n_rhs', [integer ::], 'integer', '1', 'right-hand sides')
       call make('same_as', [integer ::], 'integer', '1', 'first case with the same values, the one that was computed')
       call make('wall_seconds', [integer ::], 'real', 's', 'wall time of the case')
+      if (shape%n_modes > 0) then
+         call make('frequency', [shape%n_modes], 'real', 'rad s-1', 'natural frequency at the initial state')
+         call make('damping_ratio', [shape%n_modes], 'real', '1', 'damping ratio at the initial state')
+      end if
+      if (shape%n_states == 0) return
       do i = 1, shape%n_per_rod
          call make_state(per_rod(i), [shape%n_rods])
       end do
@@ -299,6 +315,11 @@ contains
          if (.not. allocated(error)) call file%append('n_rhs', block%n_rhs(:n), error)
          if (.not. allocated(error)) call file%append('same_as', block%same_as(:n), error)
          if (.not. allocated(error)) call file%append('wall_seconds', block%wall_seconds(:n), error)
+         if (shape%n_modes > 0) then
+            if (.not. allocated(error)) call file%append('frequency', block%frequency(:, :n), error)
+            if (.not. allocated(error)) call file%append('damping_ratio', block%damping_ratio(:, :n), error)
+         end if
+         if (shape%n_states == 0) return
          do i = 1, shape%n_per_rod
             first = (i - 1)*rods + 1
             last = i*rods
@@ -365,8 +386,9 @@ contains
       integer :: a, i
 
       call file%make_scale('case', error)
-      if (.not. allocated(error)) call file%make_scale('probe_time', error)
-      if (.not. allocated(error)) call file%make_scale('rod', error)
+      if (.not. allocated(error) .and. shape%n_states > 0) call file%make_scale('probe_time', error)
+      if (.not. allocated(error) .and. shape%n_states > 0) call file%make_scale('rod', error)
+      if (.not. allocated(error) .and. shape%n_modes > 0) call file%make_scale('mode', error)
       if (.not. allocated(error) .and. shape%n_rows > 0) call file%make_scale('row', error)
       do i = 1, size(plain)
          call attach(trim(plain(i)), 1, 'case')
@@ -374,6 +396,13 @@ contains
       do a = 1, size(sweep%axes)
          call attach('param_'//trim(sweep%axes(a)%key), 1, 'case')
       end do
+      if (shape%n_modes > 0) then
+         call attach('frequency', 1, 'mode')
+         call attach('frequency', 2, 'case')
+         call attach('damping_ratio', 1, 'mode')
+         call attach('damping_ratio', 2, 'case')
+      end if
+      if (shape%n_states == 0) return
       do i = 1, shape%n_per_rod
          call attach_state(trim(run_variables(per_rod(i))%name), 1)
       end do

@@ -132,6 +132,8 @@ contains
       call loader%field('keep_series', sweep%keep_series)
       call loader%field('case_seconds', sweep%case_seconds)
       call loader%field('lanes', sweep%lanes)
+      call loader%field('frequencies', sweep%frequencies)
+      call loader%field('integrate', sweep%integrate)
       call loader%close_group()
       if (base_is_sound .and. entry_of(checked, 'sweep', 1, 'probe_times', any_state=.true.) == 0) &
          sweep%probe_times = [sweep%base_case%t_end]
@@ -141,6 +143,11 @@ contains
          exit
       end do
 
+      if (.not. sweep%integrate) then
+         if (sweep%frequencies == 0) call blame(checked, 'sweep', 1, 'integrate', &
+                                                'leaves nothing to compute unless frequencies is positive')
+         if (sweep%keep_series) call blame(checked, 'sweep', 1, 'keep_series', 'needs integrate = .true.')
+      end if
       n_axes = instances(checked, 'axis')
       allocate (sweep%axes(n_axes))
       if (n_axes == 0) call checked%faults%add(checked%document%n_lines, '&axis: at least one is required')

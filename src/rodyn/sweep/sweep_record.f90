@@ -1,7 +1,8 @@
 !> The result of a case as a run of 64-bit words that proves itself.
 !>
 !> Record: length in words; case; status; attempt; n_steps; n_rhs; t_reached; wall and integration seconds; bytes of the
-!> message; the message; if the case is done, final state, probes, times and series; CRC-64 of all before it.
+!> message; the message; if the case is done, frequencies, damping ratios, final state, probes, times and series; CRC-64 of all
+!> before it.
 module rodyn_sweep_record
    use rodyn_kinds, only: wp, i8
    use rodyn_checksum, only: crc64
@@ -22,7 +23,8 @@ contains
       type(case_shape), intent(in) :: shape
       integer, intent(in) :: status, message_length
       record_words = shortest_record + (message_length + 7)/8
-      if (status == status_done) record_words = record_words + shape%n_states*(1 + shape%n_probes + shape%n_rows) + shape%n_rows
+      if (status == status_done) record_words = record_words + 2*shape%n_modes + &
+                                                shape%n_states*(1 + shape%n_probes + shape%n_rows) + shape%n_rows
    end function record_words
 
    !> Write a record into the first `n` words.
@@ -50,6 +52,8 @@ contains
          at = at + 1
       end do
       if (kept%status == status_done) then
+         call put(kept%frequency)
+         call put(kept%damping_ratio)
          call put(kept%final)
          do i = 1, shape%n_probes
             call put(kept%probes(:, i))
@@ -97,6 +101,8 @@ contains
          at = at + 1
       end do
       if (kept%status /= status_done) return
+      call get(kept%frequency)
+      call get(kept%damping_ratio)
       call get(kept%final)
       do i = 1, shape%n_probes
          call get(kept%probes(:, i))

@@ -24,6 +24,10 @@ module rodyn_sweep_schema
          help='a case that computes longer than this has failed; 0: no limit'), &
       schema_row('sweep', 'lanes', type_logical, default='.true.', &
          help='like cases by dop853 side by side in vector lanes, eight at once; false: one by one'), &
+      schema_row('sweep', 'frequencies', type_integer, default='0', rule=in_range, low=0.0_wp, high=1.0e6_wp, &
+         help='natural frequencies and damping ratios to keep of each case at its initial state, from the lowest'), &
+      schema_row('sweep', 'integrate', type_logical, default='.true.', &
+         help='false: only the frequencies are computed'), &
       schema_row('axis', 'key', type_text, rule=up_to, high=80.0_wp, example="'mass_ratio'", &
          help='group.name as in a case, with (3) for one element; or mass_ratio, of all nodes to all rods'), &
       schema_row('axis', 'values', type_real, any_list, default='depends', example='2, 4, 8', &

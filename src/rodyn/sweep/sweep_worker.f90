@@ -90,7 +90,7 @@ contains
       type(sweep_config), intent(in) :: sweep
       type(sweep_plan), intent(in) :: plan
       uses_lanes = .false.
-      if (sweep%lanes .and. .not. hinges_move(sweep)) uses_lanes = fewest_alike(sweep, plan) >= worthwhile
+      if (sweep%lanes .and. sweep%integrate .and. .not. hinges_move(sweep)) uses_lanes = fewest_alike(sweep, plan) >= worthwhile
    end function uses_lanes
 
    !> Do hinges have switches and events of their own, which differ from case to case?
@@ -104,7 +104,9 @@ contains
       type(sweep_config), intent(in) :: sweep
       type(sweep_plan), intent(in) :: plan
       character(len=:), allocatable :: text
-      if (uses_lanes(sweep, plan)) then
+      if (.not. sweep%integrate) then
+         text = 'none (nothing is integrated)'
+      else if (uses_lanes(sweep, plan)) then
          text = 'like cases by dop853 side by side in '//to_text(lanes)//' lanes, others one by one'
       else if (sweep%lanes .and. hinges_move(sweep)) then
          text = 'one by one (hinges move by programs or have events)'
@@ -204,7 +206,7 @@ contains
       call prepare_case(self%sweep, self%plan, self%shape, case, new%motion, new%y, new%times, new%t_end, new%keeper, &
                         new%choice, error)
       late = .false.
-      if (.not. allocated(error)) then
+      if (.not. allocated(error) .and. self%sweep%integrate) then
          new%options = new%choice%options
          new%limit = self%sweep%case_seconds
          if (self%in_lanes .and. goes_in_lane(new)) then

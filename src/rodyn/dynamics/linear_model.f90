@@ -1,0 +1,80 @@
+!> The equations of motion about a state, linearised in full:
+!>
+!>     M dp' + (D + G) dp + K dq = 0,   dq' = dp + (terms of the turning axes).
+!>
+!> M is the mass matrix, D that of the dampers, G what the velocities of the state add (gyroscopic, if they are those of a
+!> spin), and K the tangent stiffness: springs and rods, loads that turn with the spacecraft, centrifugal and other inertia
+!> forces. About a state that is no equilibrium the accelerations of the state are held fixed.
+module rodyn_linear_model
+   use rodyn_kinds, only: wp
+   use rodyn_errors, only: error_type, raise
+   use rodyn_motion, only: motion_type, differentiate_balance
+   implicit none (type, external)
+   private
+   public :: linear_model, new_linear_model
+
+   !> Matrices over equations (as p), coordinates (as q) and rates (as p).
+   type :: linear_model
+      integer :: n_base = 0                  !! unknowns of the spacecraft: 3 or 0
+      real(wp), allocatable :: q(:), p(:)    !! the state (n_q), (dof)
+      real(wp), allocatable :: acceleration(:) !! p' there (dof)
+      real(wp), allocatable :: mass(:, :)      !! M (dof, dof)
+      real(wp), allocatable :: damping(:, :)   !! D (dof, dof)
+      real(wp), allocatable :: gyration(:, :)  !! G (dof, dof)
+      real(wp), allocatable :: stiffness(:, :) !! K (dof, n_q); behind the dof columns those of relaxing hinges
+      real(wp), allocatable :: joints(:, :)    !! dth'/dq of relaxing hinges (n_q - dof, n_q)
+      logical :: loaded = .false.            !! some load acts
+      integer :: n_free_hinges = 0           !! hinges without spring
+      integer :: n_idle_hinges = 0           !! hinges with neither spring nor damper
+   contains
+      procedure :: is_steady
+   end type linear_model
+
+contains
+
+   !> Linearise at a time and state. Loads are those of `motion%dynamics%set_regime`.
+   subroutine new_linear_model(model, motion, t, y, error)
+      type(linear_model), intent(out) :: model
+      type(motion_type), intent(inout) :: motion
+      real(wp), intent(in) :: t    !! [s]
+      real(wp), intent(in) :: y(:) !! (q, p, ...)
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: by_state(:, :)
+      logical :: ok
+
+      associate (r => motion%n_q, m => motion%n_dof, scene => motion%dynamics%scene, forces => motion%dynamics%forces)
+         model%n_base = scene%n_base
+         model%q = y(:r)
+         model%p = y(r + 1:r + m)
+         allocate (model%acceleration(m), model%joints(r - m, r), by_state(m, r + m))
+         call differentiate_balance(motion, t, y, model%acceleration, by_state, model%joints, ok)
+         if (.not. ok) then
+            call raise(error, 'the equations cannot be linearised: no finite accelerations, or a mass matrix that is not '// &
+                       'positive definite')
+            return
+         end if
+         model%mass = motion%system%m
+         model%stiffness = by_state(:, :r)
+         allocate (model%damping(m, m), source=0.0_wp)
+         if (r == m) model%damping = motion%system%d
+         model%gyration = by_state(:, r + 1:) - model%damping
+         model%loaded = any(abs(forces%base) > 0.0_wp)
+         if (motion%dynamics%regime%on_nodes) model%loaded = model%loaded .or. any(abs(forces%node) > 0.0_wp)
+         associate (law => scene%hinges)
+            model%n_free_hinges = count(law%stiffness <= 0.0_wp)
+            model%n_idle_hinges = count(law%stiffness <= 0.0_wp .and. law%damping <= 0.0_wp)
+         end associate
+      end associate
+   end subroutine new_linear_model
+
+   !> Do the chain and the spin stay as they are, to rounding?
+   pure logical function is_steady(self, fastest)
+      class(linear_model), intent(in) :: self
+      real(wp), intent(in) :: fastest !! highest frequency [rad/s]
+      associate (c => self%n_base + 1, w => min(self%n_base + 1, 3))
+         is_steady = all(abs(self%p(c:)) <= 0.0_wp) .and. &
+                     all(abs(self%acceleration(w:)) <= 1.0e3_wp*epsilon(1.0_wp)*fastest**2)
+      end associate
+   end function is_steady
+
+end module rodyn_linear_model

@@ -1,0 +1,274 @@
+!> The modes of a scene as an HDF5 file, SPEC "rodyn modes".
+!>
+!> Over (mode, rod), (mode) or (mode, joint): each coordinate of the shapes as two data sets, NAME_real and NAME_imag, since
+!> HDF5 has no complex numbers. Over (equation, rate) and (equation, coordinate): the matrices of the linear model.
+module rodyn_modes_file
+   use rodyn_errors, only: error_type
+   use rodyn_kinds, only: wp
+   use rodyn_kinematics, only: slopes
+   use rodyn_linear_model, only: linear_model
+   use rodyn_modes, only: mode_set
+   use rodyn_result_file, only: provenance, result_file
+   use rodyn_scene, only: scene_type
+   use rodyn_text, only: to_text
+   implicit none (type, external)
+   private
+   public :: write_modes
+
+   real(wp), parameter :: pi = acos(-1.0_wp)
+   integer, parameter :: name_length = 24
+
+contains
+
+   !> Write everything and give the file its name.
+   subroutine write_modes(path, force, origin, scene, model, modes, equilibrium, error)
+      character(len=*), intent(in) :: path
+      logical, intent(in) :: force             !! replace an existing file
+      type(provenance), intent(in) :: origin
+      type(scene_type), intent(in) :: scene
+      type(linear_model), intent(in) :: model
+      type(mode_set), intent(in) :: modes      !! with shapes
+      logical, intent(in) :: equilibrium       !! the state was sought as one
+      type(error_type), allocatable, intent(out) :: error
+      type(result_file) :: file
+      integer :: compression, i
+
+      compression = 4
+      call file%begin(path, force, error)
+      if (allocated(error)) return
+      call file%write_provenance(origin, error)
+      if (.not. allocated(error)) call write_axes()
+      if (.not. allocated(error)) call write_eigenvalues()
+      if (.not. allocated(error)) call write_shapes(file, scene, model, modes, compression, error)
+      if (.not. allocated(error)) call write_state()
+      if (.not. allocated(error)) call write_matrices()
+      if (.not. allocated(error)) call write_summary()
+      if (allocated(error)) then
+         call file%discard()
+      else
+         call file%complete('done', error)
+      end if
+
+   contains
+
+      subroutine write_axes()
+         call axis('mode', [(i, i=1, modes%n)], 'rigid bodies, mechanisms, oscillations, relaxations; each by rising frequency')
+         call axis('rod', [(i, i=1, scene%n)], 'rod, counted from the spacecraft')
+         if (size(scene%hinges%relaxing) > 0) &
+            call axis('joint', scene%hinges%relaxing, 'hinge whose rotation is a state, counted from the spacecraft')
+         call names('coordinate', coordinate_names(scene, .false.), 'coordinate, as its change')
+         call names('rate', coordinate_names(scene, .true.), 'rate; of the spacecraft along the turning axes')
+         call names('equation', coordinate_names(scene, .true.), 'balance of forces in the row of this rate')
+      end subroutine write_axes
+
+      subroutine axis(name, values, long_name)
+         character(len=*), intent(in) :: name, long_name
+         integer, contiguous, intent(in) :: values(:)
+         if (allocated(error)) return
+         call file%file%write(name, values, compression, error)
+         if (.not. allocated(error)) call file%describe(name, '1', long_name, error)
+         if (.not. allocated(error)) call file%file%make_scale(name, error)
+      end subroutine axis
+
+      subroutine names(name, values, long_name)
+         character(len=*), intent(in) :: name, values(:), long_name
+         if (allocated(error)) return
+         call file%file%create_series(name, [integer ::], size(values), compression, error, 'text')
+         if (.not. allocated(error)) call file%file%append(name, values, error)
+         if (.not. allocated(error)) call file%file%put_attribute(name, 'long_name', long_name, error)
+         if (.not. allocated(error)) call file%file%make_scale(name, error)
+      end subroutine names
+
+      subroutine write_eigenvalues()
+         call per_mode('frequency', modes%frequency(), 'rad s-1', 'natural frequency, magnitude of the eigenvalue')
+         call per_mode('frequency_hz', modes%frequency()/(2.0_wp*pi), 'Hz', 'natural frequency in cycles')
+         call per_mode('frequency_damped', aimag(modes%eigenvalue), 'rad s-1', 'frequency of the motion, imaginary part')
+         call per_mode('damping_ratio', modes%damping_ratio(), '1', 'decay over natural frequency; -1 or 1 of relaxations')
+         call per_mode('decay', modes%decay(), 's-1', 'rate of decay, minus the real part; negative: it grows')
+         if (allocated(error)) return
+         call file%file%create_series('kind', [integer ::], modes%n, compression, error, 'text')
+         if (.not. allocated(error)) call file%file%append('kind', modes%kind, error)
+         if (.not. allocated(error)) call file%file%put_attribute('kind', 'long_name', &
+            'rigid body, mechanism, oscillation or relaxation', error)
+         if (.not. allocated(error)) call file%file%attach_scale('kind', 1, 'mode', error)
+      end subroutine write_eigenvalues
+
+      subroutine per_mode(name, values, units, long_name)
+         character(len=*), intent(in) :: name, units, long_name
+         real(wp), contiguous, intent(in) :: values(:)
+         if (allocated(error)) return
+         call file%file%write(name, values, compression, error)
+         if (.not. allocated(error)) call file%describe(name, units, long_name, error)
+         if (.not. allocated(error)) call file%file%attach_scale(name, 1, 'mode', error)
+      end subroutine per_mode
+
+      !> The state the equations are linearised about.
+      subroutine write_state()
+         call vector('state', model%q, 'coordinate', 'm or rad', 'coordinates of the state')
+         call vector('state_rate', model%p, 'rate', 'm s-1 or rad s-1', 'rates of the state')
+         call vector('state_acceleration', model%acceleration, 'rate', 'm s-2 or rad s-2', 'rates of these rates')
+      end subroutine write_state
+
+      subroutine vector(name, values, scale, units, long_name)
+         character(len=*), intent(in) :: name, scale, units, long_name
+         real(wp), contiguous, intent(in) :: values(:)
+         if (allocated(error)) return
+         call file%file%write(name, values, compression, error)
+         if (.not. allocated(error)) call file%describe(name, units, long_name, error)
+         if (.not. allocated(error)) call file%file%attach_scale(name, 1, scale, error)
+      end subroutine vector
+
+      subroutine write_matrices()
+         call matrix('mass_matrix', model%mass, 'rate', 'kg, kg m or kg m2', 'M of M dp'' + (D + G) dp + K dq = 0')
+         call matrix('damping_matrix', model%damping, 'rate', 'N s and N m s', 'D of the dampers in the hinges')
+         call matrix('gyroscopic_matrix', model%gyration, 'rate', 'N s and N m s', 'G of the velocities of the state')
+         call matrix('stiffness_matrix', model%stiffness, 'coordinate', 'N and N m', 'K, tangent stiffness')
+      end subroutine write_matrices
+
+      !> Rows of a Fortran matrix become rows in C and Python.
+      subroutine matrix(name, values, column, units, long_name)
+         character(len=*), intent(in) :: name, column, units, long_name
+         real(wp), contiguous, intent(in) :: values(:, :)
+         real(wp), allocatable :: rows(:, :)
+         if (allocated(error)) return
+         rows = transpose(values)
+         call file%file%write(name, rows, compression, error)
+         if (.not. allocated(error)) call file%describe(name, units, long_name, error)
+         if (.not. allocated(error)) call file%file%attach_scale(name, 1, column, error)
+         if (.not. allocated(error)) call file%file%attach_scale(name, 2, 'equation', error)
+      end subroutine matrix
+
+      subroutine write_summary()
+         call file%file%put_attribute('/', 'at', trim(merge('equilibrium  ', 'initial state', equilibrium)), error)
+         if (.not. allocated(error)) call file%file%put_attribute('/', 'stable', &
+            all([(modes%is_stable(i), i=1, modes%n)]), error)
+         if (.not. allocated(error)) call file%file%put_attribute('/', 'conservative', modes%conservative, error)
+         if (.not. allocated(error)) call file%file%put_attribute('/', 'steady', model%is_steady(modes%fastest), error)
+      end subroutine write_summary
+
+   end subroutine write_modes
+
+   !> 'displacement_x', ..., 'phi_1', ... or those of the rates.
+   function coordinate_names(scene, rates) result(names)
+      type(scene_type), intent(in) :: scene
+      logical, intent(in) :: rates
+      character(len=name_length), allocatable :: names(:)
+      integer :: i, at
+
+      allocate (names(merge(scene%n_dof, scene%n_q, rates)))
+      at = 0
+      if (scene%n_base > 0 .and. rates) names(:3) = [character(len=name_length) :: 'velocity_x', 'velocity_y', 'omega']
+      if (scene%n_base > 0 .and. .not. rates) &
+         names(:3) = [character(len=name_length) :: 'displacement_x', 'displacement_y', 'rotation']
+      at = scene%n_base
+      call add('phi')
+      if (scene%dynamic_bending) call add('alpha')
+      if (scene%dynamic_bending) call add('beta')
+      if (scene%n_bend == 3) call add('bubble')
+      do i = scene%n_dof + 1, size(names)
+         names(i) = 'joint_'//to_text(scene%hinges%relaxing(i - scene%n_dof))
+      end do
+
+   contains
+
+      subroutine add(name)
+         character(len=*), intent(in) :: name
+         character(len=5) :: ending
+         ending = ''
+         if (rates) ending = '_rate'
+         do i = 1, scene%n
+            names(at + i) = name//trim(ending)//'_'//to_text(i)
+         end do
+         at = at + scene%n
+      end subroutine add
+
+   end function coordinate_names
+
+   !> The shapes, one coordinate after the other; what the scene has not is zero, and slopes without inertia follow.
+   subroutine write_shapes(file, scene, model, modes, compression, error)
+      type(result_file), intent(in) :: file
+      type(scene_type), intent(in) :: scene
+      type(linear_model), intent(in) :: model
+      type(mode_set), intent(in) :: modes
+      integer, intent(in) :: compression
+      type(error_type), allocatable, intent(out) :: error
+      complex(wp), allocatable :: place(:, :), phi(:, :), alpha(:, :), beta(:, :)
+      integer :: i
+
+      allocate (place(modes%n, 3), source=(0.0_wp, 0.0_wp))
+      if (scene%n_base > 0) place = transpose(modes%shape(:3, :))
+      allocate (alpha(scene%n, modes%n), beta(scene%n, modes%n))
+      do i = 1, modes%n
+         call slope_shapes(scene, size(model%p), modes%shape(:, i), alpha(:, i), beta(:, i))
+      end do
+      call scalar('displacement_x', place(:, 1), 'm', 'displacement of the spacecraft, moving x axis')
+      call scalar('displacement_y', place(:, 2), 'm', 'displacement of the spacecraft, moving y axis')
+      call scalar('rotation', place(:, 3), 'rad', 'rotation of the spacecraft')
+      phi = modes%shape(scene%phi_at() + 1:scene%phi_at() + scene%n, :)
+      call table('phi', phi, 'rod', 'angle from the moving x axis to the chord of the rod')
+      call table('alpha', alpha, 'rod', 'slope of the rod against its chord at the inner end')
+      call table('beta', beta, 'rod', 'slope of the rod against its chord at the outer end')
+      if (scene%n_bend == 3) call table('bubble', modes%shape(scene%bend_at(3) + 1:scene%bend_at(3) + scene%n, :), 'rod', &
+                                        'deflection by the third bending shape in the middle of the rod', 'm')
+      if (scene%n_q > scene%n_dof) call table('joint_rotation', modes%shape(scene%n_dof + 1:, :), 'joint', &
+                                             'rotation of the hinge, a state of its own')
+
+   contains
+
+      subroutine scalar(name, x, units, long_name)
+         character(len=*), intent(in) :: name, units, long_name
+         complex(wp), contiguous, intent(in) :: x(:)
+         call part(name//'_real', real(x, wp), units, long_name//', real part of the shape')
+         call part(name//'_imag', aimag(x), units, long_name//', imaginary part of the shape')
+      end subroutine scalar
+
+      subroutine part(name, x, units, long_name)
+         character(len=*), intent(in) :: name, units, long_name
+         real(wp), contiguous, intent(in) :: x(:)
+         if (allocated(error)) return
+         call file%file%write(name, x, compression, error)
+         if (.not. allocated(error)) call file%describe(name, units, long_name, error)
+         if (.not. allocated(error)) call file%file%attach_scale(name, 1, 'mode', error)
+      end subroutine part
+
+      subroutine table(name, x, scale, long_name, units)
+         character(len=*), intent(in) :: name, scale, long_name
+         complex(wp), contiguous, intent(in) :: x(:, :)
+         character(len=*), intent(in), optional :: units !! absent: 'rad'
+         character(len=:), allocatable :: unit
+         unit = 'rad'
+         if (present(units)) unit = units
+         call table_part(name//'_real', real(x, wp), scale, unit, long_name//', real part of the shape')
+         call table_part(name//'_imag', aimag(x), scale, unit, long_name//', imaginary part of the shape')
+      end subroutine table
+
+      subroutine table_part(name, x, scale, unit, long_name)
+         character(len=*), intent(in) :: name, scale, unit, long_name
+         real(wp), contiguous, intent(in) :: x(:, :)
+         if (allocated(error)) return
+         call file%file%write(name, x, compression, error)
+         if (.not. allocated(error)) call file%describe(name, unit, long_name, error)
+         if (.not. allocated(error)) call file%file%attach_scale(name, 1, scale, error)
+         if (.not. allocated(error)) call file%file%attach_scale(name, 2, 'mode', error)
+      end subroutine table_part
+
+   end subroutine write_shapes
+
+   !> Slopes that go with a change of q: they are affine in it.
+   subroutine slope_shapes(scene, n_p, shape, alpha, beta)
+      type(scene_type), intent(in) :: scene
+      integer, intent(in) :: n_p
+      complex(wp), intent(in) :: shape(:)
+      complex(wp), intent(out) :: alpha(:), beta(:)
+      real(wp), dimension(scene%n, 3) :: a, b
+      real(wp) :: rates(n_p), unused(scene%n), also_unused(scene%n)
+
+      rates = 0.0_wp
+      call slopes(scene, spread(0.0_wp, 1, size(shape)), rates, a(:, 3), b(:, 3), unused, also_unused)
+      call slopes(scene, real(shape, wp), rates, a(:, 1), b(:, 1), unused, also_unused)
+      call slopes(scene, aimag(shape), rates, a(:, 2), b(:, 2), unused, also_unused)
+      alpha = cmplx(a(:, 1) - a(:, 3), a(:, 2) - a(:, 3), wp)
+      beta = cmplx(b(:, 1) - b(:, 3), b(:, 2) - b(:, 3), wp)
+   end subroutine slope_shapes
+
+end module rodyn_modes_file

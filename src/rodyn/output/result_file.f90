@@ -1,0 +1,199 @@
+!> A result on its way to the disk, and what every result says of its origin.
+!>
+!> Until `complete` has put everything onto the disk, the file has a temporary name, `PATH.partial-PID`: whatever has the
+!> final name is complete.
+module rodyn_result_file
+   use rodyn_build_info, only: compiler, compiler_options, git_commit, program_version
+   use rodyn_errors, only: error_type, exit_bad_input, raise
+   use rodyn_hdf5_files, only: hdf5_file, hdf5_version
+   use rodyn_posix, only: host_name, ignore_file_size_signal, is_directory, is_writable, parent_directory, path_exists, &
+      process_id, remove_file, rename_new, rename_over, sync_path, utc_now
+   implicit none (type, external)
+   private
+   public :: provenance, result_file, check_output_path, text_or_empty
+
+   !> What a result is the result of.
+   type :: provenance
+      character(len=:), allocatable :: title
+      character(len=:), allocatable :: input            !! the namelist as read
+      character(len=:), allocatable :: resolved_input   !! every key with the value used
+      character(len=:), allocatable :: notes            !! what to know about the model, one line each
+      character(len=:), allocatable :: sundials_version
+   end type provenance
+
+   !> An HDF5 file under its temporary name.
+   type :: result_file
+      type(hdf5_file) :: file               !! for what this type does not write
+      character(len=:), allocatable :: path !! final name
+      character(len=:), allocatable :: temporary_path
+      logical :: force = .false.            !! `complete` may replace an existing file
+   contains
+      procedure :: begin
+      procedure :: write_provenance
+      procedure :: describe
+      procedure :: complete
+      procedure :: discard
+      procedure, private :: put_on_disk
+   end type result_file
+
+contains
+
+   !> Refuse a path at which no result can or may appear. Nothing is written.
+   subroutine check_output_path(path, force, error)
+      character(len=*), intent(in) :: path
+      logical, intent(in) :: force                       !! an existing file may be replaced
+      type(error_type), allocatable, intent(out) :: error
+      character(len=:), allocatable :: directory
+
+      directory = parent_directory(path)
+      if (len(path) == 0) then
+         call raise(error, 'the name of the output file is empty', exit_bad_input)
+      else if (is_directory(path)) then
+         call raise(error, path//': is a directory; give the name of a file', exit_bad_input)
+      else if (path_exists(path) .and. .not. force) then
+         call raise(error, path//': exists already; --force replaces it', exit_bad_input)
+      else if (.not. path_exists(directory)) then
+         call raise(error, path//": the directory '"//directory//"' does not exist", exit_bad_input)
+      else if (.not. is_directory(directory)) then
+         call raise(error, path//": '"//directory//"' is not a directory that can be read", exit_bad_input)
+      else if (.not. is_writable(directory)) then
+         call raise(error, path//": no permission to write in the directory '"//directory//"'", exit_bad_input)
+      end if
+   end subroutine check_output_path
+
+   !> Make the file under its temporary name.
+   subroutine begin(self, path, force, error)
+      class(result_file), intent(inout) :: self
+      character(len=*), intent(in) :: path                !! final name
+      logical, intent(in) :: force                        !! `complete` may replace an existing file
+      type(error_type), allocatable, intent(out) :: error
+
+      call check_output_path(path, force, error)
+      if (allocated(error)) return
+      call ignore_file_size_signal()
+      self%path = path
+      self%temporary_path = free_temporary_name(path)
+      self%force = force
+      call self%file%create(self%temporary_path, error)
+   end subroutine begin
+
+   !> Root attributes: what ran, with what, on what.
+   subroutine write_provenance(self, origin, error)
+      class(result_file), intent(in) :: self
+      type(provenance), intent(in) :: origin
+      type(error_type), allocatable, intent(out) :: error
+
+      call put('title', text_or_empty(origin%title))
+      call put('status', 'running')
+      call put('program_version', program_version)
+      call put('git_commit', git_commit)
+      call put('compiler', compiler())
+      call put('compiler_options', compiler_options())
+      call put('sundials_version', text_or_empty(origin%sundials_version))
+      call put('hdf5_version', hdf5_version())
+      call put('hostname', host_name())
+      call put('created', utc_now())
+      call put('input', text_or_empty(origin%input))
+      call put('resolved_input', text_or_empty(origin%resolved_input))
+      call put('notes', text_or_empty(origin%notes))
+
+   contains
+
+      subroutine put(name, value)
+         character(len=*), intent(in) :: name, value
+         if (.not. allocated(error)) call self%file%put_attribute('/', name, value, error)
+      end subroutine put
+
+   end subroutine write_provenance
+
+   !> Unit and meaning of a data set.
+   subroutine describe(self, name, units, long_name, error)
+      class(result_file), intent(in) :: self
+      character(len=*), intent(in) :: name, units, long_name
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%file%put_attribute(name, 'units', units, error)
+      if (.not. allocated(error)) call self%file%put_attribute(name, 'long_name', long_name, error)
+   end subroutine describe
+
+   !> Write the status, close the file and give it its final name.
+   subroutine complete(self, status, error)
+      class(result_file), intent(inout) :: self
+      character(len=*), intent(in) :: status !! 'done', 'failed', 'stopped'
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%file%put_attribute('/', 'status', status, error)
+      if (.not. allocated(error)) call self%file%flush(error)
+      if (.not. allocated(error)) call self%file%close(error)
+      if (allocated(error)) then
+         call self%discard()
+      else
+         call self%put_on_disk(error)
+      end if
+   end subroutine complete
+
+   !> Give up: close and remove the temporary file.
+   subroutine discard(self)
+      class(result_file), intent(inout) :: self
+      type(error_type), allocatable :: ignored
+      character(len=:), allocatable :: failure
+
+      call self%file%close(ignored)
+      if (allocated(self%temporary_path)) failure = remove_file(self%temporary_path)
+   end subroutine discard
+
+   !> Sync the closed file, rename it, sync the directory's names. If the final name was taken meanwhile, the
+   !> result stays under its temporary name and the message says so.
+   subroutine put_on_disk(self, error)
+      class(result_file), intent(in) :: self
+      type(error_type), allocatable, intent(out) :: error
+      character(len=:), allocatable :: failure
+      logical :: taken
+
+      failure = sync_path(self%temporary_path)
+      if (len(failure) > 0) then
+         call raise(error, self%temporary_path//': the result could not be put onto the disk: '//failure)
+         return
+      end if
+
+      taken = .false.
+      if (self%force) then
+         failure = rename_over(self%temporary_path, self%path)
+      else
+         call rename_new(self%temporary_path, self%path, taken, failure)
+      end if
+      if (taken) then
+         call raise(error, self%path//": appeared while this run was computing and is left alone; this run's result is '"// &
+            self%temporary_path//"'", exit_bad_input)
+      else if (len(failure) > 0) then
+         call raise(error, self%path//": cannot be given its name: "//failure//"; the result is '"//self%temporary_path//"'")
+      else
+         failure = sync_path(parent_directory(self%path))
+         if (len(failure) > 0) call raise(error, self%path//': its name could not be put onto the disk: '//failure)
+      end if
+   end subroutine put_on_disk
+
+   !> A name beside the final one that no file has. Process numbers repeat in containers, so they alone will not do.
+   function free_temporary_name(path) result(name)
+      character(len=*), intent(in) :: path
+      character(len=:), allocatable :: name
+      character(len=32) :: suffix
+      integer :: attempt
+
+      write (suffix, '(".partial-", i0)') process_id()
+      name = path//trim(suffix)
+      do attempt = 2, 1000
+         if (.not. path_exists(name)) return
+         write (suffix, '(".partial-", i0, "-", i0)') process_id(), attempt
+         name = path//trim(suffix)
+      end do
+   end function free_temporary_name
+
+   pure function text_or_empty(text) result(value)
+      character(len=:), allocatable, intent(in) :: text
+      character(len=:), allocatable :: value
+      value = ''
+      if (allocated(text)) value = text
+   end function text_or_empty
+
+end module rodyn_result_file

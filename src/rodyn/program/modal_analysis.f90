@@ -1,0 +1,117 @@
+!> One case from its description to its modes: what `rodyn modes` does, and what a library user may call.
+module rodyn_modal_analysis
+   use, intrinsic :: iso_fortran_env, only: output_unit
+   use rodyn_kinds, only: wp
+   use rodyn_case_config, only: case_config, load_config
+   use rodyn_case_reader, only: resolved_case
+   use rodyn_equilibrium, only: find_equilibrium
+   use rodyn_errors, only: error_type
+   use rodyn_integrators, only: sundials_version
+   use rodyn_loads, only: new_load_set
+   use rodyn_linear_model, only: linear_model, new_linear_model
+   use rodyn_modes, only: mode_set, new_modes, rigid_body, mechanism, relaxation
+   use rodyn_modes_file, only: write_modes
+   use rodyn_motion, only: motion_type, new_motion, initial_state
+   use rodyn_notes, only: notes_on
+   use rodyn_result_file, only: check_output_path, provenance
+   use rodyn_scene, only: scene_type, new_scene
+   implicit none (type, external)
+   private
+   public :: analyse_modes, modes_at_start
+
+   real(wp), parameter :: pi = acos(-1.0_wp)
+   integer, parameter :: most_rows = 40 !! of the table on the terminal
+
+contains
+
+   !> Compute the modes of a case, write them, and print a table.
+   subroutine analyse_modes(config, path, equilibrium, loads, error, input_text, force, quiet)
+      type(case_config), intent(in) :: config
+      character(len=*), intent(in) :: path                 !! of the HDF5 file
+      logical, intent(in) :: equilibrium                   !! about the equilibrium near the initial state, under loads
+      logical, intent(in) :: loads                         !! about the initial state: the loads of t = 0 act
+      type(error_type), allocatable, intent(out) :: error
+      character(len=*), intent(in), optional :: input_text !! namelist as read, kept in the file
+      logical, intent(in), optional :: force               !! replace an existing file
+      logical, intent(in), optional :: quiet               !! print nothing
+      type(scene_type) :: scene
+      type(motion_type) :: motion
+      type(linear_model) :: model
+      type(mode_set) :: modes
+      type(provenance) :: origin
+      logical :: silent, replace
+
+      silent = .false.
+      replace = .false.
+      if (present(quiet)) silent = quiet
+      if (present(force)) replace = force
+      call check_output_path(path, replace, error)
+      if (.not. allocated(error)) call new_scene(scene, config, error)
+      if (.not. allocated(error)) call new_motion(motion, scene, .false., error)
+      if (.not. allocated(error)) call modes_at_start(motion, config, equilibrium, loads, .true., model, modes, error)
+      if (allocated(error)) return
+      origin%title = config%title
+      origin%resolved_input = resolved_case(config)
+      origin%notes = notes_on(scene, model%q(:scene%n_dof), .false.)
+      origin%sundials_version = sundials_version()
+      if (present(input_text)) origin%input = input_text
+      call write_modes(path, replace, origin, scene, model, modes, equilibrium, error)
+      if (allocated(error) .or. silent) return
+      call print_table(modes)
+      if (.not. equilibrium .and. .not. model%is_steady(modes%fastest)) write (output_unit, '(a)') &
+         'note    the initial state is no equilibrium: these are the modes of its equations held at t = 0; see --equilibrium'
+      write (output_unit, '(a)') 'file    '//path
+   end subroutine analyse_modes
+
+   !> Linear model and modes of a case at t = 0.
+   subroutine modes_at_start(motion, config, equilibrium, loads, with_shapes, model, modes, error)
+      type(motion_type), intent(inout) :: motion !! without a ledger
+      type(case_config), intent(in) :: config
+      logical, intent(in) :: equilibrium, loads, with_shapes
+      type(linear_model), intent(out) :: model
+      type(mode_set), intent(out) :: modes
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: y(:)
+
+      if (.not. (loads .or. equilibrium)) call new_load_set(motion%dynamics%scene%loads, [load_config ::], config%t_end)
+      associate (switches => motion%dynamics%scene%loads%switches)
+         call motion%dynamics%set_regime(0.0_wp, minval([switches, config%t_end]))
+      end associate
+      call initial_state(motion, config%initial, y)
+      if (equilibrium) call find_equilibrium(motion, 0.0_wp, y, error)
+      if (.not. allocated(error)) call new_linear_model(model, motion, 0.0_wp, y, error)
+      if (.not. allocated(error)) call new_modes(modes, model, with_shapes, error)
+   end subroutine modes_at_start
+
+   !> One line for each mode, as far as there is room.
+   subroutine print_table(modes)
+      type(mode_set), intent(in) :: modes
+      real(wp), dimension(modes%n) :: frequency, ratio, decay
+      character(len=120) :: line
+      integer :: i
+
+      frequency = modes%frequency()
+      ratio = modes%damping_ratio()
+      decay = modes%decay()
+      write (output_unit, '(a)') '  mode   frequency, rad/s   frequency, Hz   damping ratio      decay, 1/s   kind'
+      do i = 1, min(modes%n, most_rows)
+         if (modes%kind(i) == rigid_body .or. modes%kind(i) == mechanism) then
+            write (line, '(i6, f19.6, f16.6, 35x, a)') i, 0.0_wp, 0.0_wp, modes%kind(i)
+         else if (modes%kind(i) == relaxation) then
+            write (line, '(i6, 51x, es16.6, 3x, a)') i, decay(i), modes%kind(i)
+         else
+            write (line, '(i6, f19.6, f16.6, 2es16.6, 3x, a)') i, frequency(i), frequency(i)/(2.0_wp*pi), ratio(i), &
+               decay(i), modes%kind(i)
+         end if
+         if (.not. modes%is_stable(i)) line = trim(line)//', growing'
+         write (output_unit, '(a)') trim(line)
+      end do
+      if (modes%n > most_rows) write (output_unit, '(a, i0, a)') '   ... and ', modes%n - most_rows, ' more in the file'
+      if (all([(modes%is_stable(i), i=1, modes%n)])) then
+         write (output_unit, '(a)') 'stable  no mode grows'
+      else
+         write (output_unit, '(a, i0, a)') 'unstable  ', count([(.not. modes%is_stable(i), i=1, modes%n)]), ' of them grow'
+      end if
+   end subroutine print_table
+
+end module rodyn_modal_analysis

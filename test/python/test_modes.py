@@ -1,0 +1,133 @@
+"""rodyn modes: what is in its file, that the matrices and eigenvalues belong together, and its pictures.
+
+RODYN=path  the program under test; otherwise bin/rodyn.
+"""
+
+import pathlib
+import subprocess
+import sys
+
+import mode_shapes
+import numpy as np
+import pytest
+import result_files
+import xarray
+from rodyn_data import DataError
+from test_command_line import DAMPED, FIXED, KINKED, SCENES, SPACECRAFT, rodyn, write_case
+
+TEXTS = ["title", "status", "program_version", "git_commit", "compiler", "input", "resolved_input", "notes", "at"]
+
+
+def modes_of(directory: pathlib.Path, text: str, *options: str) -> xarray.Dataset:
+    write_case(directory, text)
+    result = rodyn("modes", "case.nml", "--force", *options, cwd=directory)
+    assert result.returncode == 0, result.stderr
+    with xarray.open_dataset(directory / "case_modes.h5") as data:
+        return data.load()
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_every_scene_has_a_file_that_explains_itself(scene, tmp_path):
+    data = modes_of(tmp_path, SCENES[scene])
+    for name, variable in data.variables.items():
+        assert "long_name" in variable.attrs, name
+        assert "units" in variable.attrs or variable.dtype.kind in "OUT", name
+    assert all(isinstance(data.attrs[name], str) for name in TEXTS)
+    assert data.attrs["status"] == "done" and data.attrs["at"] == "initial state"
+    assert data.phi_real.dims == ("mode", "rod") and data.rotation_imag.dims == ("mode",)
+    assert data.mass_matrix.dims == ("equation", "rate") and data.stiffness_matrix.dims == ("equation", "coordinate")
+    np.testing.assert_allclose(data.frequency, np.hypot(data.frequency_damped, data.decay), rtol=1e-14)
+    assert list(data.kind.values).count("rigid body") == (0 if "motion = 'fixed'" in SCENES[scene] else 3)
+    oscillations = data.frequency.values[data.kind.values == "oscillation"]
+    assert oscillations.size and np.all(np.diff(oscillations) >= 0)
+
+
+@pytest.mark.parametrize("spin", [0, 2])
+def test_frequencies_are_those_of_the_matrices(tmp_path, spin):
+    """The pencil of the matrices in the file, by numpy; velocity and place of the spacecraft add zeros and +-i spin."""
+    data = modes_of(tmp_path, SPACECRAFT + DAMPED + f"&initial omega = {spin} /\n", "--equilibrium")
+    mass, stiffness = data.mass_matrix.values, data.stiffness_matrix.values
+    damping = data.damping_matrix.values + data.gyroscopic_matrix.values
+    n = mass.shape[0]
+    matrix = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, damping)]])
+    matrix[0, 1], matrix[1, 0] = spin, -spin
+    found = np.linalg.eigvals(matrix)
+    for decay, frequency, kind in zip(data.decay.values, data.frequency_damped.values, data.kind.values, strict=True):
+        if kind == "oscillation":
+            assert np.abs(found - (-decay + 1j * frequency)).min() < 1e-7
+    assert data.attrs["stable"] == 1 and data.attrs["steady"] == 1
+
+
+def test_the_damping_matrix_is_that_of_the_dampers(tmp_path):
+    with_dampers = modes_of(tmp_path, FIXED + DAMPED)
+    without = modes_of(tmp_path, FIXED + DAMPED.replace(", hinge_damping = 0.02", ""))
+    assert np.abs(with_dampers.damping_matrix).max() > 0 and not without.damping_matrix.any()
+    assert without.attrs["conservative"] == 1 and with_dampers.attrs["conservative"] == 0
+    assert not np.abs(without.phi_imag).any()
+    # First order of perturbation: 2 zeta omega = x^T D x of a shape with x^T M x = 1.
+    shapes = np.concatenate([without.phi_real, without.alpha_real, without.beta_real], axis=1)
+    np.testing.assert_allclose(np.einsum("mi,ij,mj->m", shapes, without.mass_matrix, shapes), 1, rtol=1e-9)
+    expected = np.einsum("mi,ij,mj->m", shapes, with_dampers.damping_matrix, shapes) / 2
+    np.testing.assert_allclose(with_dampers.decay, expected, rtol=1e-6)
+
+
+def test_kinks_fold_the_equilibrium(tmp_path):
+    data = modes_of(tmp_path, SPACECRAFT + KINKED, "--equilibrium")
+    state = data.state.sel(coordinate=["phi_1", "phi_2", "phi_3"])
+    np.testing.assert_allclose(state, [0, 0.05, 0.05], atol=1e-12)
+    assert data.attrs["at"] == "equilibrium"
+
+
+def test_where_there_is_no_equilibrium_that_is_said(tmp_path):
+    write_case(tmp_path, SCENES["no ledger"])
+    result = rodyn("modes", "case.nml", "--equilibrium", cwd=tmp_path)
+    assert result.returncode == 1 and "turn the spacecraft ever faster" in result.stderr
+    assert not (tmp_path / "case_modes.h5").exists()
+    write_case(tmp_path, FIXED + KINKED + "&load target = 'node', node = 1, component = 'Y', law = 'sine_squared', value = 1, rate = 1 /\n")
+    result = rodyn("modes", "case.nml", "--equilibrium", cwd=tmp_path)
+    assert result.returncode == 1 and "a load varies in time" in result.stderr
+
+
+def test_loads_act_on_request(tmp_path):
+    plain = modes_of(tmp_path, SCENES["no ledger"])
+    loaded = modes_of(tmp_path, SCENES["no ledger"], "--loads")
+    assert list(loaded.kind.values).count("rigid body") == 3 and loaded.attrs["steady"] == 0
+    assert abs(loaded.frequency.values[3] / plain.frequency.values[3] - 1) > 0.01
+
+
+def test_modes_behave_as_a_command(tmp_path):
+    write_case(tmp_path, FIXED + KINKED)
+    first = rodyn("modes", "case.nml", "--output", "m.h5", cwd=tmp_path)
+    assert first.returncode == 0 and "oscillation" in first.stdout and first.stdout.endswith("file    m.h5\n")
+    assert "exists already" in rodyn("modes", "case.nml", "--output", "m.h5", cwd=tmp_path).stderr
+    assert rodyn("modes", "case.nml", "--output", "case.nml", "--force", cwd=tmp_path).returncode == 2
+    assert rodyn("run", "case.nml", "--equilibrium", cwd=tmp_path).returncode == 2
+    assert rodyn("modes", "case.nml", "--quiet", "--force", cwd=tmp_path).stdout == ""
+    assert "--equilibrium" in rodyn("modes", "--help").stdout and "rodyn modes" in rodyn("--help").stdout
+
+
+def test_two_hundred_rods_take_seconds(tmp_path):
+    chain = DAMPED.replace("n_rods = 3, length = 1.5, 1.4, 1.3", "n_rods = 200, length = 1.5").replace("6000, 2*4000", "4000")
+    data = modes_of(tmp_path, SPACECRAFT + chain)
+    assert data.sizes["equation"] == 603 and list(data.kind.values).count("oscillation") == 600
+    assert np.all(data.damping_ratio[3:] > 0)
+
+
+@pytest.mark.parametrize("options", [[], ["--modes", "4", "5", "--frame", "moving", "--amplitude", "0.3"]])
+def test_shapes_are_drawn(tmp_path, options):
+    modes_of(tmp_path, SCENES["flexible"])
+    script = result_files.ROOT / "postproc" / "mode_shapes.py"
+    result = subprocess.run([sys.executable, str(script), str(tmp_path / "case_modes.h5"), "--out", str(tmp_path / "m.png"), *options],
+                            capture_output=True, text=True)
+    assert result.returncode == 0 and (tmp_path / "m.png").stat().st_size > 10000, result.stderr
+
+
+def test_the_picture_swings_as_far_as_it_is_told(tmp_path):
+    modes_of(tmp_path, SCENES["flexible"])
+    with mode_shapes.open_modes(tmp_path / "case_modes.h5") as found:
+        still, ahead, behind, *_ = mode_shapes.swing(found, found.oscillations()[0], 1e-3, "inertial")
+        reach = np.abs(ahead.nodes - still.nodes).max()
+        assert np.isclose(reach, 1e-3 * found.per_rod("length").sum(), rtol=1e-2)
+        np.testing.assert_allclose(ahead.nodes + behind.nodes, 2 * still.nodes, atol=1e-2 * reach)
+    with pytest.raises(DataError, match="no mode 99"):
+        mode_shapes.plot(tmp_path / "case_modes.h5", tmp_path / "x.png", modes=[99])
