@@ -3,12 +3,12 @@
 !> Effort is counted, not timed, so that the same scene gets the same method everywhere. The unit is one right-hand side;
 !> what else a step costs was measured (docs/performance.md, `bench_newton`).
 module rodyn_method_trial
-   use rodyn_kinds, only: wp
+   use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type
    use rodyn_lanes, only: lanes
    use rodyn_scene, only: scene_type
    use rodyn_motion, only: motion_type, new_motion
-   use rodyn_integrator, only: integrator_type, solver_options, solver_statistics
+   use rodyn_integrator, only: integrator_type, monitor_type, solver_options, solver_statistics
    use rodyn_integrators, only: new_integrator
    implicit none (type, external)
    private
@@ -28,6 +28,14 @@ module rodyn_method_trial
    real(wp), parameter :: first_effort = 400.0_wp     !! of a candidate, doubled from round to round
    real(wp), parameter :: even_effort = 3000.0_wp     !! are enough to know the pace of methods that follow all vibrations
    real(wp), parameter :: clear_lead = 4.0_wp         !! of an implicit method, with which the trial ends
+
+   !> Passes on that someone wants an end, and no more: what a trial reports is not the run.
+   type, extends(monitor_type) :: trial_monitor
+      class(monitor_type), pointer :: outer => null()
+   contains
+      procedure :: report
+      procedure :: stop_requested
+   end type trial_monitor
 
    !> A run that can be continued.
    type :: runner
@@ -65,7 +73,7 @@ contains
    !> Effort that each candidate would need from 0 to `t_end`, huge if it fails. An implicit method may creep at first,
    !> until vibrations it does not follow have died out. So its pace is that of the last round; that of order 2, which no
    !> vibration holds back, may go on growing.
-   subroutine try_methods(scene, y, options, t_first, t_end, share, forecast, effort)
+   subroutine try_methods(scene, y, options, t_first, t_end, share, forecast, effort, monitor)
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: y(:)                  !! state at t = 0, without quadratures
       type(solver_options), intent(in) :: options
@@ -74,12 +82,15 @@ contains
       real(wp), intent(in) :: share                 !! of the effort of the best even method, for one candidate at most
       real(wp), intent(out) :: forecast(size(candidates))
       real(wp), intent(out) :: effort               !! spent on the trial
+      class(monitor_type), target, intent(inout), optional :: monitor !! may end the trial, which then tells nothing
+      type(trial_monitor), target :: listener
       type(runner) :: runners(size(candidates))
       real(wp) :: allowed, budget, others(size(candidates))
       integer :: i
 
+      if (present(monitor)) listener%outer => monitor
       do i = 1, size(candidates)
-         call start_runner(runners(i), candidates(i), scene, y, options, t_first)
+         call start_runner(runners(i), candidates(i), scene, y, options, t_first, listener)
       end do
       allowed = first_effort
       do
@@ -140,13 +151,14 @@ contains
       end do
    end function forecast_of
 
-   subroutine start_runner(self, candidate, scene, y, options, t_end)
+   subroutine start_runner(self, candidate, scene, y, options, t_end, listener)
       type(runner), intent(inout) :: self
       type(candidate_type), intent(in) :: candidate
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: y(:)
       type(solver_options), intent(in) :: options
       real(wp), intent(in) :: t_end
+      type(trial_monitor), target, intent(inout) :: listener
       type(solver_options) :: own
       type(error_type), allocatable :: error
 
@@ -160,6 +172,7 @@ contains
          call new_integrator(self%integrator, self%motion, trim(candidate%method), own, error)
       end if
       if (.not. allocated(error)) then
+         if (associated(listener%outer)) call self%integrator%set_monitor(listener)
          call self%integrator%set_stop(t_end)
          call self%integrator%start(0.0_wp, y, error)
       end if
@@ -196,5 +209,19 @@ contains
       self%pace = (self%reached - reached_before)/(self%effort - effort_before)
       if (pace_before > 0.0_wp) self%growth = [self%pace/pace_before, self%growth(1)]
    end subroutine continue_runner
+
+   !> Nothing.
+   subroutine report(self, t, n_steps)
+      class(trial_monitor), intent(inout) :: self
+      real(wp), intent(in) :: t
+      integer(i8), intent(in) :: n_steps
+      associate (unused => self, unused_t => t, unused_n => n_steps); end associate
+   end subroutine report
+
+   function stop_requested(self) result(requested)
+      class(trial_monitor), intent(in) :: self
+      logical :: requested
+      requested = self%outer%stop_requested()
+   end function stop_requested
 
 end module rodyn_method_trial

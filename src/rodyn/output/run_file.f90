@@ -12,18 +12,19 @@ module rodyn_run_file
    use rodyn_errors, only: error_type, exit_bad_input, raise
    use rodyn_hdf5_files, only: hdf5_file, hdf5_version
    use rodyn_kinds, only: i8, wp
-   use rodyn_posix, only: host_name, ignore_file_size_signal, is_directory, is_writable, parent_directory, path_exists, &
-      process_id, remove_file, rename_new, rename_over, sync_path, utc_now
+   use rodyn_posix, only: host_name, ignore_file_size_signal, is_directory, is_special, is_writable, &
+      parent_directory, path_exists, process_id, remove_file, rename_new, rename_over, sync_path, utc_now
    use rodyn_run_layout, only: i_alpha, i_alpha_rate, i_angular_momentum, i_beta, i_beta_rate, i_displacement_x, &
       i_displacement_y, i_energy_dissipated, i_energy_elastic, i_energy_kinetic, i_energy_residual, i_momentum_x, &
       i_momentum_y, i_omega, i_phi, i_phi_rate, i_rotation, i_time, i_velocity_x, i_velocity_y, i_work_external, &
       n_run_variables, run_coordinates, run_variables, solver_group
    implicit none (type, external)
    private
-   public :: run_file, run_header, run_row, solver_report, new_run_row, check_output_path
+   public :: run_file, run_header, run_row, solver_report, new_run_row, is_finite, check_output_path
 
    integer, parameter :: block_bytes = 2*1024*1024 !! memory for rows that wait to be written
    integer, parameter :: most_block_rows = 4096
+   integer, parameter :: longest_name = 255 - 24, longest_path = 4095 - 24 !! of Linux, less what temporary names add [bytes]
    integer, parameter :: bytes_per_real = 8
 
    !> What is known before the first row.
@@ -127,6 +128,19 @@ contains
       allocate (row%phi_rate(n_rods), row%alpha_rate(n_rods), row%beta_rate(n_rods), source=0.0_wp)
    end function new_run_row
 
+   !> Are all numbers of a row finite?
+   pure logical function is_finite(row)
+      type(run_row), intent(in) :: row
+      real(wp), parameter :: most = huge(1.0_wp)
+
+      is_finite = all(abs([row%velocity_x, row%velocity_y, row%omega, row%displacement_x, row%displacement_y, row%rotation, &
+                           row%energy_kinetic, row%energy_elastic, row%energy_dissipated, row%work_external, &
+                           row%energy_residual, row%momentum_x, row%momentum_y, row%angular_momentum]) <= most)
+      is_finite = is_finite .and. all(abs(row%phi) <= most) .and. all(abs(row%phi_rate) <= most)
+      is_finite = is_finite .and. all(abs(row%alpha) <= most) .and. all(abs(row%alpha_rate) <= most)
+      is_finite = is_finite .and. all(abs(row%beta) <= most) .and. all(abs(row%beta_rate) <= most)
+   end function is_finite
+
    !> Let the finished file have another name, replacing what has it: the rows of a stopped run do not take the
    !> place of its result.
    subroutine redirect(self, path)
@@ -146,8 +160,12 @@ contains
       directory = parent_directory(path)
       if (len(path) == 0) then
          call raise(error, 'the name of the output file is empty', exit_bad_input)
+      else if (len(path) - index(path, '/', back=.true.) > longest_name .or. len(path) > longest_path) then
+         call raise(error, path//': the name of the output file is too long', exit_bad_input)
       else if (is_directory(path)) then
          call raise(error, path//': is a directory; give the name of a file', exit_bad_input)
+      else if (is_special(path)) then
+         call raise(error, path//': is a device or a pipe; give the name of a file', exit_bad_input)
       else if (path_exists(path) .and. .not. force) then
          call raise(error, path//': exists already; --force replaces it', exit_bad_input)
       else if (.not. path_exists(directory)) then
