@@ -88,7 +88,7 @@ contains
       string = buffer(:n)//"'"
    end function quoted
 
-   !> Text that is safe on a terminal: control characters become '?', and no more than `limit` bytes.
+   !> Text that is safe on a terminal: control characters and bytes that are no UTF-8 become '?', and no more than `limit` bytes.
    pure function printable(text, limit) result(clean)
       character(len=*), intent(in) :: text
       integer, intent(in) :: limit !! longest result, not counting the dots that mark a cut

@@ -8,6 +8,7 @@ module rodyn_command_line
    use rodyn_posix_files, only: watch_signals
    use rodyn_run, only: run_case
    use rodyn_posix, only: same_path, write_output
+   use rodyn_scene, only: scene_type, new_scene
    use rodyn_sweep_config, only: sweep_config
    use rodyn_sweep_engine, only: run_sweep, sweep_options
    use rodyn_sweep_reader, only: default_sweep, parse_sweep
@@ -113,6 +114,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(case_config) :: config
       type(sweep_config) :: sweep
+      type(scene_type) :: scene
       type(input_texts) :: input
 
       call read_input_texts(options%file, input, error)
@@ -121,6 +123,7 @@ contains
          call parse_sweep(input%text, input%name, input%base_text, input%base_name, .true., sweep, error)
       else
          call parse_case(input%text, input%name, config, error)
+         if (.not. allocated(error)) call new_scene(scene, config, error) ! numbers that are finite, but not what follows from them
       end if
       if (.not. allocated(error) .and. .not. options%quiet) call print_text(options%file//': valid', error)
    end subroutine check_command
