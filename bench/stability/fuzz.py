@@ -245,7 +245,7 @@ def campaign(seed: int, numbers: list[int], jobs: int, directory: pathlib.Path, 
                 shown[like] += 1
                 place = keep(directory, seed, outcome, reduce and shown[like] <= 3)
                 tell(f"mutant {outcome.number} ({outcome.kind}): {outcome.fault}: {place}")
-            if len(outcomes) % 1000 == 0:
+            if len(outcomes) % 100 == 0:
                 tell(f"{len(outcomes)} mutants, {sum(bool(o.fault) for o in outcomes)} faults, {time.time() - start:.0f} s")
     return outcomes
 

@@ -51,8 +51,8 @@ def in_order(found: dict[str, tuple[pathlib.Path, set[str]]]) -> tuple[list[str]
     return order, foreign
 
 
-def compile_file(compiler: str, path: pathlib.Path) -> bool:
-    target = BUILD / f"{path.name}.o"
+def compile_module(compiler: str, name: str, path: pathlib.Path) -> bool:
+    target = BUILD / f"{name}.o"
     if target.exists() and target.stat().st_mtime > path.stat().st_mtime:
         return True
     done = subprocess.run([compiler, *FLAGS, "-c", path, "-o", target], capture_output=True, text=True)
@@ -62,11 +62,16 @@ def compile_file(compiler: str, path: pathlib.Path) -> bool:
     return False
 
 
+def quadmath_directory() -> pathlib.Path:
+    found = subprocess.run(["gcc", "-print-file-name=libquadmath.so"], capture_output=True, text=True, check=True)
+    return pathlib.Path(found.stdout.strip()).parent
+
+
 def main(compiler: str) -> int:
     BUILD.mkdir(parents=True, exist_ok=True)
     found = modules()
     order, foreign = in_order(found)
-    refused = [name for name in order if not compile_file(compiler, found[name][0])]
+    refused = [name for name in order if not compile_module(compiler, name, found[name][0])]
     library = [name for name in order if name.startswith("rodyn")]
     print(f"{len(library)} modules of the library compile; {len([n for n in foreign if n.startswith('rodyn')])} need foreign modules; "
           f"{len(refused)} are refused: {', '.join(refused)}")
@@ -78,8 +83,11 @@ def main(compiler: str) -> int:
                          + "   implicit none\n   type(suite_tally) :: tally\n   type(unittest), allocatable :: suite(:)\n"
                          + "".join(f"   call collect_{suite}(suite)\n   call run_suite('{suite}', suite, tally, '')\n" for suite, _ in suites)
                          + "   print '(i0, a, i0, a)', tally%passed, ' passed, ', tally%failed, ' failed'\nend program tester\n")
-    objects = [BUILD / f"{found[name][0].name}.o" for name in order if name not in refused]
-    done = subprocess.run([compiler, *FLAGS, main_file, *objects, "-o", BUILD / "tester", "-llapack", "-lblas"])
+    objects = [BUILD / f"{name}.o" for name in order if name not in refused]
+    shim = BUILD / "quad_math.o"
+    subprocess.run(["gcc", "-O2", "-c", pathlib.Path(__file__).with_name("quad_math.c"), "-o", shim], check=True)
+    done = subprocess.run([compiler, *FLAGS, main_file, *objects, shim, "-o", BUILD / "tester", "-llapack", "-lblas",
+                           f"-L{quadmath_directory()}", "-lquadmath"])
     if done.returncode != 0 or refused:
         return 1
     return subprocess.run([BUILD / "tester"]).returncode

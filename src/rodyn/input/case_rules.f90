@@ -291,6 +291,7 @@ contains
       character(len=16) :: digits
       write (digits, '(g0.6)') x
       text = trim(adjustl(digits))
+      if (text(1:1) == '.') text = '0'//text ! which some compilers leave out
    end function short
 
 end module rodyn_case_rules
