@@ -184,6 +184,7 @@ contains
          end do
          if (.not. all([is_sound(checked, 'axis', i, 'start'), is_sound(checked, 'axis', i, 'stop'), &
                         is_sound(checked, 'axis', i, 'count'), is_sound(checked, 'axis', i, 'spacing')])) return
+         if (n < 1) return ! `count` is missing, which was told above
          if (spacing == 'log' .and. .not. (first > 0.0_wp .and. last > 0.0_wp)) then
             call blame(checked, 'axis', i, 'spacing', 'needs positive start and stop')
          else if (n == 1 .and. abs(last - first) > 0.0_wp) then
