@@ -17,7 +17,7 @@ module rodyn_run_file
       n_run_variables, run_coordinates, run_variables, solver_group
    implicit none (type, external)
    private
-   public :: run_file, run_header, run_row, solver_report, new_run_row, check_output_path
+   public :: run_file, run_header, run_row, solver_report, new_run_row, is_finite, check_output_path
 
    integer, parameter :: block_bytes = 2*1024*1024 !! memory for rows that wait to be written
    integer, parameter :: most_block_rows = 4096
@@ -111,6 +111,19 @@ contains
       allocate (row%phi(n_rods), row%alpha(n_rods), row%beta(n_rods), source=0.0_wp)
       allocate (row%phi_rate(n_rods), row%alpha_rate(n_rods), row%beta_rate(n_rods), source=0.0_wp)
    end function new_run_row
+
+   !> Are all numbers of a row finite?
+   pure logical function is_finite(row)
+      type(run_row), intent(in) :: row
+      real(wp), parameter :: most = huge(1.0_wp)
+
+      is_finite = all(abs([row%velocity_x, row%velocity_y, row%omega, row%displacement_x, row%displacement_y, row%rotation, &
+                           row%energy_kinetic, row%energy_elastic, row%energy_dissipated, row%work_external, &
+                           row%energy_residual, row%momentum_x, row%momentum_y, row%angular_momentum]) <= most)
+      is_finite = is_finite .and. all(abs(row%phi) <= most) .and. all(abs(row%phi_rate) <= most)
+      is_finite = is_finite .and. all(abs(row%alpha) <= most) .and. all(abs(row%alpha_rate) <= most)
+      is_finite = is_finite .and. all(abs(row%beta) <= most) .and. all(abs(row%beta_rate) <= most)
+   end function is_finite
 
    !> Let the finished file have another name, replacing what has it: the rows of a stopped run do not take the
    !> place of its result.

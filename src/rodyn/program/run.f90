@@ -13,7 +13,8 @@ module rodyn_run
    use rodyn_method_choice, only: method_choice, choose_method
    use rodyn_simulation, only: observer_type, simulate
    use rodyn_ledger, only: fill_row
-   use rodyn_run_file, only: run_file, run_header, run_row, solver_report, new_run_row, check_output_path
+   use rodyn_run_needs, only: check_needs
+   use rodyn_run_file, only: run_file, run_header, run_row, solver_report, new_run_row, is_finite, check_output_path
    use rodyn_progress, only: progress_monitor, new_progress
    use rodyn_description, only: describe_scene
    use rodyn_notes, only: notes_on
@@ -67,11 +68,13 @@ contains
       call system_clock(clock_start, clock_rate)
 
       call check_output_path(path, replace, error)
+      if (.not. allocated(error)) call check_needs(config, path, error)
       if (.not. allocated(error)) call new_scene(scene, config, error)
       if (.not. allocated(error)) call new_motion(motion, scene, config%output%ledger, error)
       if (allocated(error)) return
       call initial_state(motion, config%initial, y)
-      call choose_method(choice, config%solver, options_of(config), scene, y(:motion%n_controlled), config%t_end)
+      progress = new_progress(0.0_wp, config%t_end, silent)
+      call choose_method(choice, config%solver, options_of(config), scene, y(:motion%n_controlled), config%t_end, progress)
       header%notes = notes_on(scene, y(:scene%n_dof), config%output%ledger)
       if (.not. silent) then
          write (output_unit, '(a)') describe_scene(scene, config%output%ledger)
@@ -93,7 +96,6 @@ contains
       call recorder%file%create(path, header, replace, error)
       if (allocated(error)) return
       recorder%row = new_run_row(scene%n)
-      progress = new_progress(0.0_wp, config%t_end, silent)
       call integrator%set_monitor(progress)
       call simulate(motion, integrator, [(config%t_end*(real(i, wp)/config%n_outputs), i=0, config%n_outputs)], &
                     config%t_end, recorder, y, t, failure)
@@ -132,6 +134,10 @@ contains
       end if
       self%started = .true.
       call fill_row(motion, t, y, self%initial_energy, self%row)
+      if (.not. is_finite(self%row)) then
+         call raise(error, 'at t = '//time_text(t)//' s: states or energies beyond all numbers')
+         return
+      end if
       self%worst_residual = max(self%worst_residual, abs(self%row%energy_residual))
       self%energy_scale = max(self%energy_scale, self%row%energy_kinetic + self%row%energy_elastic)
       call self%file%append(self%row, error)

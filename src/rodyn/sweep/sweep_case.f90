@@ -238,21 +238,26 @@ contains
    end subroutine make_nan
 
    !> Everything about a case that comes before its integration, frequencies among it. `keeper%kept` is the caller's to set.
-   subroutine prepare_case(sweep, plan, shape, case, motion, y, times, t_end, keeper, choice, error)
+   subroutine prepare_case(sweep, plan, shape, case, pulse, clock_start, motion, y, times, t_end, keeper, choice, late, error)
       type(sweep_config), intent(in) :: sweep
       type(sweep_plan), intent(in) :: plan
       type(case_shape), intent(in) :: shape
       integer, intent(in) :: case
+      class(pulse_type), target, intent(inout) :: pulse
+      integer(i8), intent(in) :: clock_start         !! when work on the case began [counts]
       type(motion_type), intent(inout) :: motion
       real(wp), allocatable, intent(out) :: y(:)     !! state at t = 0
       real(wp), allocatable, intent(out) :: times(:) !! at which the keeper wants to see it [s]
       real(wp), intent(out) :: t_end                 !! [s]
       type(keeper_type), intent(inout) :: keeper
       type(method_choice), intent(out) :: choice
+      logical, target, intent(out) :: late           !! the choice of the method alone took longer than the case may
       type(error_type), allocatable, intent(out) :: error
       type(case_config) :: config
       type(scene_type) :: scene
+      type(case_monitor), target :: monitor
 
+      late = .false.
       t_end = 0.0_wp
       call build_case(sweep, plan, case, config, error)
       if (.not. allocated(error)) call new_scene(scene, config, error)
@@ -262,7 +267,12 @@ contains
       if (sweep%frequencies > 0) call keep_frequencies(scene, config, keeper%kept, error)
       if (allocated(error) .or. .not. sweep%integrate) return
       call initial_state(motion, config%initial, y)
-      call choose_method(choice, config%solver, options_of(config), scene, y, t_end)
+      monitor = new_monitor(sweep, pulse, clock_start, late)
+      call choose_method(choice, config%solver, options_of(config), scene, y, t_end, monitor)
+      if (choice%tried) then
+         if (monitor%stop_requested()) call raise(error, 'stopped on request at t = 0 s', exit_stopped)
+         if (allocated(error)) return
+      end if
       keeper%row = new_run_row(scene%n)
       keeper%n_rods = shape%n_rods
       keeper%keep_series = sweep%keep_series
@@ -314,10 +324,7 @@ contains
       late = .false.
       call new_integrator(integrator, motion, choice%method, choice%options, error)
       if (allocated(error)) return
-      monitor%pulse => pulse
-      monitor%clock_start = clock_start
-      monitor%limit = sweep%case_seconds
-      monitor%late => late
+      monitor = new_monitor(sweep, pulse, clock_start, late)
       call integrator%set_monitor(monitor)
       call system_clock(clock_a, clock_rate)
       call simulate(motion, integrator, times, t_end, keeper, y, keeper%kept%t_reached, error)
@@ -443,6 +450,18 @@ contains
       state(6*n_rods + 1:) = [row%velocity_x, row%velocity_y, row%omega, &
                               row%displacement_x, row%displacement_y, row%rotation]
    end subroutine place
+
+   function new_monitor(sweep, pulse, clock_start, late) result(monitor)
+      type(sweep_config), intent(in) :: sweep
+      class(pulse_type), target, intent(inout) :: pulse
+      integer(i8), intent(in) :: clock_start
+      logical, target, intent(inout) :: late
+      type(case_monitor) :: monitor
+      monitor%pulse => pulse
+      monitor%clock_start = clock_start
+      monitor%limit = sweep%case_seconds
+      monitor%late => late
+   end function new_monitor
 
    !> Nothing: the sweep has a progress of its own.
    subroutine report(self, t, n_steps)
