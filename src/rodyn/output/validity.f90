@@ -157,10 +157,10 @@ contains
       character(len=:), allocatable :: text
 
       text = 'rod '//to_text(k)//' vibrates at '//two_digits(vibration(self%rods(k), self%n_seen))// &
-             ' of its own first frequency, '//two_digits(self%rods(k)%own_frequency)// &
-             ' rad/s, which one rod has 11 % too fast; cut it in two'
+             ' times its own first frequency ('//two_digits(self%rods(k)%own_frequency)// &
+             ' rad/s, which one rod has 11 % too fast); it would be better cut in two'
       associate (others => count(vibration(self%rods, self%n_seen) > frequency_share) - 1)
-         if (others > 0) text = text//', and '//to_text(others)//' more rods'
+         if (others > 0) text = text//', as would '//to_text(others)//' more rods'
       end associate
    end function vibration_warning
 

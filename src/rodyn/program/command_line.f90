@@ -7,7 +7,7 @@ module rodyn_command_line
    use rodyn_file_text, only: read_text_file
    use rodyn_modal_analysis, only: analyse_modes
    use rodyn_posix_files, only: watch_signals
-   use rodyn_run, only: run_case
+   use rodyn_run, only: check_steps, run_case
    use rodyn_posix, only: same_path, write_output
    use rodyn_sweep_config, only: sweep_config
    use rodyn_sweep_engine, only: run_sweep, sweep_options
@@ -98,6 +98,7 @@ contains
       if (allocated(error)) return
       path = output_path(options, config)
       call refuse_input(path, options%file, error)
+      if (.not. allocated(error)) call refuse_steps(options, config, error)
       if (allocated(error)) return
       call watch_signals()
       call run_case(config, path, error, input_text=text, force=options%force, quiet=options%quiet)
@@ -141,9 +142,19 @@ contains
          call read_sweep(options%file, sweep, error)
       else
          call read_case(options%file, config, error=error)
+         if (.not. allocated(error)) call refuse_steps(options, config, error)
       end if
       if (.not. allocated(error) .and. .not. options%quiet) call print_text(options%file//': valid', error)
    end subroutine check_command
+
+   !> Steps that no method can take, told with the name of the file.
+   subroutine refuse_steps(options, config, error)
+      type(options_type), intent(in) :: options
+      type(case_config), intent(in) :: config
+      type(error_type), allocatable, intent(out) :: error
+      call check_steps(config, error)
+      if (allocated(error)) error%message = options%file//': '//error%message
+   end subroutine refuse_steps
 
    !> rodyn sweep
    subroutine sweep_command(options, exit_code, error)

@@ -21,7 +21,7 @@ module rodyn_run
    use rodyn_validity, only: validity_type, new_validity
    implicit none (type, external)
    private
-   public :: run_case, options_of
+   public :: run_case, check_steps, options_of
 
    !> Takes rows down into the run file.
    type, extends(observer_type) :: recorder_type
@@ -122,6 +122,22 @@ contains
          call move_alloc(failure, error)
       end if
    end subroutine run_case
+
+   !> What `run_case` would refuse of the steps of a case, exit code 2: see `rodyn_step_limit`.
+   subroutine check_steps(config, error)
+      type(case_config), intent(in) :: config
+      type(error_type), allocatable, intent(out) :: error
+      type(scene_type) :: scene
+      type(motion_type) :: motion
+      real(wp), allocatable :: y(:)
+
+      if (.not. config%solver%fixed_step > 0.0_wp) return
+      call new_scene(scene, config, error)
+      if (.not. allocated(error)) call new_motion(motion, scene, .false., error)
+      if (allocated(error)) return
+      call initial_state(motion, config%initial, y)
+      call check_fixed_step(trim(config%solver%method), options_of(config), scene, y, config%t_end, error)
+   end subroutine check_steps
 
    !> Take down one row.
    subroutine observe(self, motion, t, y, error)
