@@ -25,7 +25,7 @@ DOCUMENT = ROOT / "docs" / "stability.md"
 PICTURE = ROOT / "docs" / "pictures" / "energy-drift"
 sys.path.insert(0, str(ROOT / "postproc"))
 
-FLEXIBLE = [("1e6", "gauss:fixed"), ("1e5", "gauss:1e-8")]
+FLEXIBLE = [("1e6", "gauss:fixed")]
 RIGID = [("1e5", "gauss:fixed"), ("1e5", "gauss:1e-10"), ("1e5", "dop853:1e-10"), ("3e4", "erk8:1e-10"), ("3e3", "erk4:1e-8"),
          ("3e4", "adams:1e-8"), ("1e4", "bdf:1e-8")]
 PARTS = ["limits", "orders", "tolerances", "samples", "configurations", "extremes", "drift", "article"]
@@ -64,8 +64,7 @@ def article_runs() -> str:
 
     base = (ROOT / "cases/table1.nml").read_text()
     lines = []
-    for method, rtol, t_end, n in [("gauss", 1e-12, 480, 480), ("dop853", 1e-13, 480, 480), ("erk", 1e-12, 240, 240),
-                                   ("gauss", 1e-6, 1e5, 1000)]:
+    for method, rtol, t_end, n in [("gauss", 1e-12, 480, 480), ("dop853", 1e-13, 480, 480), ("gauss", 1e-6, 1e5, 1000)]:
         text = base.replace("t_end = 30 ", f"t_end = {t_end:g} ").replace("n_outputs = 3000", f"n_outputs = {n}")
         text = text.replace("rtol = 1e-12", f"rtol = {rtol:g}").replace("atol = 1e-13", f"atol = {0.01 * rtol:g}")
         text = text.replace("method = 'auto'", f"method = '{method}'")
@@ -80,11 +79,11 @@ def article_runs() -> str:
 def article_line(method: str, rtol: float, run, solver) -> str:
     """phi_4 at the article's times and at the end, and the change of linear momentum after the loads, of its size."""
     t = run.time.values
-    values = [run.phi.values[np.argmin(abs(t - when)), 3] if when <= t[-1] else np.nan for when in (1, 30, 60, 120, 240, 480)]
+    values = [run.phi.values[abs(t - when) < 1e-9, 3] for when in (1, 30, 60, 120, 240, 480)]
     momentum = np.hypot(run.momentum_x.values[t >= 1] - run.momentum_x.values[t >= 1][0],
                         run.momentum_y.values[t >= 1] - run.momentum_y.values[t >= 1][0]).max()
     size = np.hypot(run.momentum_x.values[-1], run.momentum_y.values[-1])
-    return "\t".join([method, f"{rtol:g}", f"{t[-1]:g}", *(f"{v:.12f}" for v in values), f"{momentum / size:.1e}",
+    return "\t".join([method, f"{rtol:g}", f"{t[-1]:g}", *(f"{v[0]:.12f}" if v.size else "–" for v in values), f"{momentum / size:.1e}",
                       f"{abs(run.alpha_rate.values[-1]).max():.1e}", str(solver["n_steps"]),
                       f"{solver['wall_seconds']:.0f}", str(run.attrs["status"])]) + "\n"
 
@@ -102,7 +101,7 @@ def table(head: list[str], body: list[list[str]]) -> str:
 def short(text: str) -> str:
     """2.77E-003 as 2.8e-3."""
     value = float(text)
-    return "0" if value == 0 else "–" if not np.isfinite(value) or abs(value) > 1e300 else f"{value:.1e}".replace("e-0", "e-").replace("e+0", "e")
+    return "0" if value == 0 else "–" if not np.isfinite(value) or abs(value) > 1e300 else f"{value:.1e}".replace("e-0", "e-").replace("e+0", "e").replace("e+", "e")
 
 
 def named(method: str, order: str) -> str:
@@ -197,7 +196,7 @@ def draw_drift() -> None:
     import style
 
     figure, panels = style.new_figure(1, 2, height=3.3, sharey=True)
-    for axes, wanted in zip(panels[0], ("flexible", "rigid"), strict=True):
+    for axes, wanted in zip(panels[0], ("rigid", "flexible"), strict=True):
         for i, (_, word, _, (periods, error)) in enumerate(run for run in drift_runs() if run[0] == wanted):
             axes.loglog(periods, np.maximum.accumulate(abs(error)), label=word.replace(":", ", "), **style.line_style(i))
         for power, at in ((1.0, 2e-13), (0.5, 2e-15)):
@@ -205,7 +204,8 @@ def draw_drift() -> None:
             axes.loglog(x, at * x**power, color=style.GREY, linewidth=0.8)
             axes.annotate("$t$" if power == 1.0 else r"$\sqrt{t}$", (x[-1], at * x[-1] ** power), color=style.GREY, fontsize=8)
         axes.set_xlabel("periods of the lowest mode")
-        axes.legend(fontsize=7, loc="upper left")
+        if axes.get_legend_handles_labels()[1]:
+            axes.legend(fontsize=7, loc="upper left")
         axes.set_title("one rod that bends" if wanted == "flexible" else "two rigid rods", loc="left")
     panels[0, 0].set_ylabel("largest energy error so far / energy")
     style.save(figure, PICTURE.with_suffix(".png"))
@@ -219,10 +219,10 @@ def write_document() -> None:
                        "article": article_table}.items():
         if not (RESULTS / f"{part}.txt").exists():
             continue
-        begin, end = f"<!-- {part} -->\n", "\n<!-- end -->"
+        begin, end = f"<!-- {part} -->\n", "<!-- end -->"
         before, _, rest = text.partition(begin)
         _, _, after = rest.partition(end)
-        text = before + begin + make() + end + after
+        text = before + begin + make() + "\n" + end + after
     DOCUMENT.write_text(text)
     if (RESULTS / "drift.txt").exists():
         draw_drift()
