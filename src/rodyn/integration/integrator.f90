@@ -27,6 +27,7 @@ module rodyn_integrator
       integer :: order = 0               !! highest order of a multistep method, order of a one-step method; 0: the default
       real(wp) :: max_step = 0.0_wp      !! [s]; 0: no bound
       real(wp) :: fixed_step = 0.0_wp    !! [s], one-step methods only; 0: adaptive
+      logical :: allow_unstable = .false. !! fixed steps beyond the stability limit, see `rodyn_step_limit`
       integer :: max_steps = 1000000000  !! internal steps of the whole run, restarts included
       logical :: stability_limit_detection = .true. !! BDF: lower the order where orders 3 to 5 are unstable
    end type solver_options

@@ -85,7 +85,8 @@ contains
       real(wp), intent(in) :: t_first               !! end of the trial at the latest; no load switches before [s]
       real(wp), intent(in) :: t_end                 !! [s]
       real(wp), intent(in) :: expected(n_even)      !! effort of the even methods; huge: of no use here
-      real(wp), intent(in) :: share                 !! of the effort of the best even method, for one candidate at most
+      real(wp), intent(in) :: share                 !! of the effort of the best even method, for one candidate at most, but
+                                                    !! not more than `most_effort`
       real(wp), intent(out) :: forecast(size(candidates))
       real(wp), intent(out) :: effort               !! spent on the trial
       class(monitor_type), target, intent(inout), optional :: monitor !! may end the trial, which then tells nothing
@@ -109,6 +110,7 @@ contains
          if (any(runners%reached >= t_first) .or. all(runners(n_even + 1:)%failed)) exit
          budget = share*minval(forecast(:n_even))
          if (forecast(best) < minval(forecast(:n_even))) budget = min(budget, own_share*forecast(best))
+         budget = min(budget, most_effort(scene))
          if (1.4_wp*allowed >= budget) exit ! a short round would tell nothing
          if (allowed > 3.0_wp*first_effort .and. clear_lead*forecast(best) < &
              minval(forecast, mask=[(i /= best, i=1, size(candidates))])) exit
@@ -133,6 +135,12 @@ contains
       end subroutine try_even
 
    end subroutine try_methods
+
+   !> However long the run: what a candidate may spend in about a second, since a trial says nothing and cannot be stopped.
+   pure real(wp) function most_effort(scene)
+      type(scene_type), intent(in) :: scene
+      most_effort = 5.0e6_wp/(1.0_wp + 0.37_wp*scene%n)
+   end function most_effort
 
    !> An implicit method that vibrations hold back goes on at its even pace.
    pure logical function hopeless(self, candidate, explicit_pace)

@@ -74,6 +74,7 @@ module rodyn_run_file
       integer(i8) :: n_error_test_failures = 0_i8
       integer(i8) :: n_restarts = 0_i8            !! at switches of loads
       real(wp) :: wall_seconds = 0.0_wp
+      character(len=:), allocatable :: warnings   !! where the model does not hold, one line each; a root attribute
    end type solver_report
 
    !> Rows of one data set that wait to be written.
@@ -220,6 +221,7 @@ contains
       call self%write_waiting_rows(error)
       if (.not. allocated(error)) call self%write_solver_report(report, error)
       if (.not. allocated(error)) call self%file%put_attribute('/', 't_reached', self%last_time, error)
+      if (.not. allocated(error)) call self%file%put_attribute('/', 'warnings', text_or_empty(report%warnings), error)
       if (.not. allocated(error) .and. present(message)) call self%file%put_attribute('/', 'message', message, error)
       if (allocated(error)) then
          call self%discard()

@@ -7,7 +7,7 @@ module rodyn_command_line
    use rodyn_input_texts, only: input_texts, is_result_file, read_input_texts
    use rodyn_modal_analysis, only: analyse_modes
    use rodyn_posix_files, only: watch_signals
-   use rodyn_run, only: run_case
+   use rodyn_run, only: check_steps, run_case
    use rodyn_posix, only: same_path, write_output
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_sweep_config, only: sweep_config
@@ -106,6 +106,7 @@ contains
       if (allocated(error)) return
       path = output_path(options, config, input%from_result)
       call refuse_input(path, options%file, error)
+      if (.not. allocated(error)) call refuse_steps(options, config, error)
       if (allocated(error)) return
       call watch_signals()
       call run_case(config, path, error, input_text=input%text, force=options%force, quiet=options%quiet)
@@ -159,9 +160,19 @@ contains
       else
          call parse_case(input%text, input%name, config, error)
          if (.not. allocated(error)) call new_scene(scene, config, error) ! numbers that are finite, but not what follows from them
+         if (.not. allocated(error)) call refuse_steps(options, config, error)
       end if
       if (.not. allocated(error) .and. .not. options%quiet) call print_text(options%file//': valid', error)
    end subroutine check_command
+
+   !> Steps that no method can take, told with the name of the file.
+   subroutine refuse_steps(options, config, error)
+      type(options_type), intent(in) :: options
+      type(case_config), intent(in) :: config
+      type(error_type), allocatable, intent(out) :: error
+      call check_steps(config, error)
+      if (allocated(error)) error%message = options%file//': '//error%message
+   end subroutine refuse_steps
 
    !> rodyn sweep
    subroutine sweep_command(options, exit_code, error)

@@ -23,7 +23,9 @@ module rodyn_sweep_case
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_simulation, only: observer_type, simulate
    use rodyn_sweep_config, only: sweep_config, is_ratio, value_text
+   use rodyn_step_limit, only: check_fixed_step
    use rodyn_sweep_plan, only: sweep_plan
+   use rodyn_validity, only: validity_type, new_validity
    implicit none (type, external)
    private
    public :: case_result, case_shape, pulse_type, keeper_type, build_case, build_values, new_case_shape
@@ -96,6 +98,7 @@ module rodyn_sweep_case
       integer, allocatable :: output_of(:)   !! row of the series of each time; 0: none
       logical :: keep_series = .false.
       integer :: seen = 0                    !! times so far
+      type(validity_type) :: validity
       type(case_result), pointer :: kept => null()
    contains
       procedure :: observe
@@ -273,7 +276,10 @@ contains
          if (monitor%stop_requested()) call raise(error, 'stopped on request at t = 0 s', exit_stopped)
          if (allocated(error)) return
       end if
+      call check_fixed_step(choice%method, choice%options, scene, y, t_end, error)
+      if (allocated(error)) return
       keeper%row = new_run_row(scene%n)
+      keeper%validity = new_validity(scene, config%model%deflection_limit)
       keeper%n_rods = shape%n_rods
       keeper%keep_series = sweep%keep_series
       call merge_times(config, sweep%probe_times, shape%outputs, times, keeper%probe_of, keeper%output_of)
@@ -349,8 +355,26 @@ contains
          return
       end if
       call fill_row(motion, t_end, y, 0.0_wp, keeper%row)
+      call keeper%validity%observe(keeper%row)
+      keeper%kept%message = in_one_line(keeper%validity%warnings())
       call place(keeper%row, keeper%n_rods, keeper%kept%final)
    end subroutine keep_final
+
+   !> A message has no line ends.
+   pure function in_one_line(lines) result(text)
+      character(len=*), intent(in) :: lines
+      character(len=:), allocatable :: text
+      integer :: i
+
+      text = ''
+      do i = 1, len(lines)
+         if (lines(i:i) == new_line('a')) then
+            text = text//'; '
+         else
+            text = text//lines(i:i)
+         end if
+      end do
+   end function in_one_line
 
    !> Status and message of a case that has ended. Nothing that happens to a case is an error of the sweep.
    subroutine conclude_case(sweep, late, error, kept)
@@ -427,6 +451,7 @@ contains
       end if
       if (probe == 0 .and. .not. self%keep_series) return
       call fill_row(motion, t, y, 0.0_wp, self%row)
+      call self%validity%observe(self%row)
       if (probe > 0) call place(self%row, self%n_rods, self%kept%probes(:, probe))
       if (output == 0 .or. .not. self%keep_series) return
       self%kept%times(output) = t
