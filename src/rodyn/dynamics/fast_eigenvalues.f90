@@ -95,6 +95,7 @@ contains
       real(wp), intent(in) :: q(:) !! (n_q)
       type(scene_type), intent(out) :: relaxed
       real(wp), intent(out) :: at_rest(:) !! (n_q)
+      real(wp) :: opening(0:scene%n - 1)
       integer :: first, last
 
       relaxed = scene
@@ -103,8 +104,16 @@ contains
       last = scene%phi_at() + scene%n
       at_rest = 0.0_wp
       at_rest(first:last) = q(first:last)
-      call openings(scene%n, scene%dynamic_bending, at_rest(first:), relaxed%hinges%kink)
-      relaxed%hinges%has_kinks = .true.
+      call openings(scene%n, scene%dynamic_bending, at_rest(first:), opening)
+      associate (hinges => relaxed%hinges)
+         hinges%driven = .false.
+         hinges%has_offsets = .true.
+         hinges%constant = 0.0_wp
+         hinges%friction = 0.0_wp
+         hinges%steady = 0.0_wp
+         hinges%bent = 0.0_wp
+         call hinges%set_kinks(opening, spread(0.0_wp, 1, scene%n))
+      end associate
    end subroutine relax
 
    !> The faster root of lambda^2 + damping lambda + stiffness = 0.

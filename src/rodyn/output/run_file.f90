@@ -244,7 +244,7 @@ contains
       if (.not. allocated(error)) call self%file%append('events/kind', kind, error)
       if (.not. allocated(error)) call self%file%write('events/energy_lost', energy_lost, 0, error)
       do i = 1, size(names)
-         if (.not. allocated(error)) call describe(self%file, trim(names(i)), trim(units(i)), trim(meanings(i)), error)
+         if (.not. allocated(error)) call self%describe(trim(names(i)), trim(units(i)), trim(meanings(i)), error)
          if (i > 1 .and. .not. allocated(error)) call self%file%attach_scale(trim(names(i)), 1, 'events/time', error)
       end do
       if (allocated(error)) call self%discard()
