@@ -26,7 +26,9 @@ program tester
    use test_rod_profiles, only: collect_rod_profiles
    use test_run_file, only: collect_run_file
    use test_schema, only: collect_schema
+   use test_step_limit, only: collect_step_limit
    use test_sweep, only: collect_sweep
+   use test_validity, only: collect_validity
    implicit none (type, external)
 
    abstract interface
@@ -55,6 +57,8 @@ program tester
    call run('gauss', collect_gauss)
    call run('ensemble', collect_ensemble)
    call run('method_choice', collect_method_choice)
+   call run('step_limit', collect_step_limit)
+   call run('validity', collect_validity)
    call run('progress', collect_progress)
    call run('namelist', collect_namelist)
    call run('namelist_faults', collect_namelist_faults)

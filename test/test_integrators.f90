@@ -58,7 +58,7 @@ contains
       suite = [ &
          new_test('every method follows a harmonic oscillator', harmonic), &
          new_test('bdf solves robertson with few steps', stiff), &
-         new_test('fixed steps show the order of every erk table', observed_orders), &
+         new_test('fixed steps show the order of every erk table and of dop853 to a tenth', observed_orders), &
          new_test('adaptive erk of every order meets its tolerance', adaptive_orders), &
          new_test('the number of outputs changes no bit of the final state', outputs_change_nothing), &
          new_test('outputs between steps are as accurate as steps', accurate_outputs), &
@@ -251,8 +251,9 @@ contains
       call check(error, stats%n_steps < 2000, 'too many steps')
    end subroutine stiff
 
-   !> Error of a fixed-step run with about `n` steps over 3 s, which the step does not divide.
-   function fixed_step_error(order, n) result(deviation)
+   !> Error of a fixed-step run of n steps over 3 s, which the step that is asked for does not divide.
+   function fixed_step_error(method, order, n) result(deviation)
+      character(len=*), intent(in) :: method
       integer, intent(in) :: order, n
       real(wp) :: deviation
       type(oscillator) :: system
@@ -266,22 +267,31 @@ contains
       options%fixed_step = t_end/(real(n, wp) - 0.4_wp)
       system = new_oscillator(1.0_wp, .false.)
       y = [1.0_wp, 0.0_wp]
-      call run(system, 'erk', options, t_end, 1, y, stats, error)
+      call run(system, method, options, t_end, 1, y, stats, error)
       deviation = norm2(y - [cos(t_end), -sin(t_end)])
       if (allocated(error) .or. stats%n_steps /= n) deviation = ieee_value(1.0_wp, ieee_quiet_nan)
    end function fixed_step_error
 
+   !> Five halvings; from order 6 on, where they would end in rounding, five divisions by sqrt 2.
    subroutine observed_orders(error)
       type(error_type), allocatable, intent(out) :: error
-      integer, parameter :: n_coarse(2:8) = [400, 200, 100, 40, 16, 10, 8]
-      real(wp) :: observed
-      integer :: order
+      integer, parameter :: n_coarse(8) = [100, 60, 40, 12, 12, 8, 4, 4]
+      integer, parameter :: orders(8) = [2, 3, 4, 5, 6, 7, 8, 8]
+      integer, parameter :: points = 6
+      real(wp) :: x(points), y(points), observed
+      integer :: i, j, n
       character(len=80) :: text
 
-      do order = 2, 8
-         observed = log(fixed_step_error(order, n_coarse(order))/fixed_step_error(order, 2*n_coarse(order)))/log(2.0_wp)
-         write (text, '("observed order of table ", i0)') order
-         call check_close(error, observed, real(order, wp), 0.2_wp, trim(text))
+      do i = 1, 8
+         do j = 1, points
+            n = nint(n_coarse(i)*merge(2.0_wp, sqrt(2.0_wp), orders(i) < 6)**(j - 1))
+            x(j) = -log(real(n, wp))
+            y(j) = log(fixed_step_error(trim(merge('dop853', 'erk   ', i == 8)), orders(i), n))
+         end do
+         x = x - sum(x)/points
+         observed = sum(x*y)/sum(x**2)
+         write (text, '("observed order of method ", i0, " of order ", i0)') i, orders(i)
+         call check_close(error, observed, real(orders(i), wp), 0.1_wp, trim(text))
          if (allocated(error)) return
       end do
    end subroutine observed_orders

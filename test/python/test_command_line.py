@@ -63,7 +63,7 @@ SCALAR_STATES = {"velocity_x": "m s-1", "velocity_y": "m s-1", "omega": "rad s-1
 LEDGER = {"energy_kinetic": "J", "energy_elastic": "J", "energy_dissipated": "J", "work_external": "J",
           "energy_residual": "J", "momentum_x": "kg m s-1", "momentum_y": "kg m s-1", "angular_momentum": "kg m2 s-1"}
 ROOT_TEXTS = ["title", "status", "program_version", "git_commit", "compiler", "compiler_options", "sundials_version",
-              "hdf5_version", "hostname", "created", "input", "resolved_input", "notes"]
+              "hdf5_version", "hostname", "created", "input", "resolved_input", "notes", "warnings"]
 SOLVER_NUMBERS = ["rtol", "atol", "n_steps", "n_rhs", "n_jac", "wall_seconds", "max_step", "fixed_step", "last_step",
                   "n_error_test_failures", "n_nonlinear_failures", "n_restarts", "order"]
 
@@ -239,6 +239,33 @@ def test_what_a_run_would_refuse_is_found_by_check(tmp_path, text, fault):
         assert len(result.stderr.splitlines()) == 1
         assert re.match(r"case\.nml:\d+: ", result.stderr) and fault in result.stderr
     assert files(tmp_path) == ["case.nml"]
+
+
+def test_steps_beyond_the_stability_limit_are_refused_with_the_limit_unless_allowed(tmp_path):
+    steps = TIMES + SPACECRAFT + CHAIN + MOMENT + "&solver method = 'erk', order = 4, fixed_step = %s%s /\n"
+    case = write_case(tmp_path, steps % ("5e-3", ""))
+    for command in ("check", "run"):
+        result = rodyn(command, case.name, cwd=tmp_path)
+        assert result.returncode == 2
+        limit, frequency = re.match(r"case\.nml: &solver fixed_step = 0\.005: method = 'erk' is unstable in this scene with steps above "
+                                    r"(\S+) s \(vibration of (\S+) rad/s\)", result.stderr).groups()
+    assert files(tmp_path) == ["case.nml"]
+    assert float(limit) * float(frequency) == pytest.approx(np.sqrt(8), rel=0.02)
+    assert rodyn("run", write_case(tmp_path, steps % (limit, "")).name, cwd=tmp_path).returncode == 0
+    allowed = rodyn("run", write_case(tmp_path, steps % ("5e-3", ", allow_unstable = .true.")).name, "--force", cwd=tmp_path)
+    assert allowed.returncode in (0, 1) and "unstable" not in allowed.stderr
+
+
+def test_a_rod_that_bends_too_far_ends_with_a_warning(tmp_path):
+    bent = TIMES + SPACECRAFT + CHAIN + "&initial alpha = 0, %s, beta = 0, -%s /\n&model deflection_limit = 0.05 /\n"
+    for slope, warned in (("0.1, 0", False), ("0.3, 0", True)):
+        case = write_case(tmp_path, bent % (slope, slope))
+        result = rodyn("run", case.name, "--force", cwd=tmp_path)
+        assert result.returncode == 0
+        assert ("rod 2 bends by" in printed(result.stdout).get("warning", "")) is warned
+        with xarray.open_dataset(tmp_path / "case.h5") as run:
+            assert ("rod 2 bends by" in run.attrs["warnings"]) is warned
+            assert run.attrs["status"] == "done"
 
 
 @pytest.mark.parametrize("text", [

@@ -33,7 +33,7 @@ LEDGER = {
 }
 ROOT_TEXTS = [
     "title", "status", "program_version", "git_commit", "compiler", "compiler_options", "sundials_version",
-    "hdf5_version", "hostname", "created", "input", "resolved_input", "notes",
+    "hdf5_version", "hostname", "created", "input", "resolved_input", "notes", "warnings",
 ]
 
 

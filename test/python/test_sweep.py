@@ -588,6 +588,7 @@ def test_defaults_are_a_valid_sweep(here):
     ("&sweep base = 'base.nml' /\n&axis key = 'load.value', values = 1 /", "load(1).value"),
     ("&sweep base = 'base.nml' /\n&axis key = 'output.file', text_values = 'x' /", "has no influence"),
     ("&sweep base = 'base.nml' /\n&axis key = 'case.t_end', start = 0, stop = 1, count = 3, spacing = 'log' /", "positive start"),
+    ("&sweep base = 'base.nml' /\n&axis key = 'case.t_end', stop = 1 /", "count: is required where the others"),
     ("&sweep base = 'base.nml', combine = 'zip' /\n&axis key = 'case.t_end', values = 1, 2 /\n"
      "&axis key = 'solver.rtol', values = 0.1 /", "has 1 values, but case.t_end"),
     ("&sweep base = 'base.nml', probe_times = 2, 1 /\n&axis key = 'mass_ratio', values = 1 /", "must increase"),

@@ -15,7 +15,7 @@ contains
       character(len=*), intent(in) :: path
       character(len=:), allocatable, intent(out) :: text
       type(error_type), allocatable, intent(out) :: error
-      character(len=300) :: reason
+      character(len=len(path) + 300) :: reason ! the system's message repeats the path
       integer :: stat, unit
       integer(i8) :: bytes
 

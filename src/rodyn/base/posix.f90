@@ -2,13 +2,13 @@
 !>
 !> Calls that can fail return the reason as text, empty on success, so that callers word their own messages.
 module rodyn_posix
-   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_funptr, c_int, c_intptr_t, &
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_funptr, c_int, c_int16_t, c_intptr_t, &
       c_long, c_null_char, c_null_funptr, c_null_ptr, c_ptr, c_size_t
    implicit none (type, external)
    private
    public :: posix_close, posix_closedir, posix_fsync, posix_open, posix_opendir, posix_signal ! for `rodyn_posix_files`
    public :: process_id, host_name, utc_now
-   public :: path_exists, same_path, is_directory, is_writable, parent_directory
+   public :: path_exists, same_path, is_directory, is_special, is_writable, parent_directory
    public :: sync_path, rename_over, rename_new, remove_file
    public :: ignore_file_size_signal, write_output
    public :: last_failure, last_failure_is
@@ -109,6 +109,16 @@ module rodyn_posix
          type(c_ptr), value :: stream
          integer(c_int) :: status
       end function posix_closedir
+
+      ! statx(2) has one layout on all processors: 28 bytes before the 16 bits of the mode
+      function posix_statx(directory, path, flags, mask, words) result(status) bind(c, name='statx')
+         import :: c_char, c_int, c_int16_t
+         implicit none (type, external)
+         integer(c_int), value :: directory, flags, mask
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_int16_t), intent(out) :: words(128)
+         integer(c_int) :: status
+      end function posix_statx
 
       function posix_rename(old, new) result(status) bind(c, name='rename')
          import :: c_char, c_int
@@ -248,6 +258,22 @@ contains
       directory = c_associated(stream)
       if (directory) status = posix_closedir(stream)
    end function is_directory
+
+   !> Is there something at this path that is neither a file nor a directory: a device, a pipe, a socket?
+   function is_special(path) result(special)
+      character(len=*), intent(in) :: path
+      logical :: special
+      integer(c_int), parameter :: at_fdcwd = -100, statx_type = 1                   ! <fcntl.h>, <sys/stat.h>
+      integer, parameter :: mode_type = int(o'170000'), regular = int(o'100000'), directory = int(o'040000')
+      integer(c_int16_t) :: words(128)
+      integer :: kind_of
+
+      special = .false.
+      words = 0_c_int16_t
+      if (posix_statx(at_fdcwd, path//c_null_char, 0_c_int, statx_type, words) /= 0) return
+      kind_of = iand(int(words(15)), mode_type)
+      special = kind_of /= regular .and. kind_of /= directory
+   end function is_special
 
    !> May this process make files in a directory?
    function is_writable(directory) result(writable)

@@ -1,6 +1,7 @@
 !> Small services on text: case, numbers as text, quotes, nearest names.
 module rodyn_text
    use rodyn_kinds, only: wp
+   use rodyn_utf8, only: first_bad_byte
    implicit none (type, external)
    private
    public :: lower, is_name, is_digit
@@ -87,7 +88,7 @@ contains
       string = buffer(:n)//"'"
    end function quoted
 
-   !> Text that is safe on a terminal: control characters become '?', and no more than `limit` bytes.
+   !> Text that is safe on a terminal: control characters and bytes that are no UTF-8 become '?', and no more than `limit` bytes.
    pure function printable(text, limit) result(clean)
       character(len=*), intent(in) :: text
       integer, intent(in) :: limit !! longest result, not counting the dots that mark a cut
@@ -98,12 +99,18 @@ contains
       do i = 1, len(clean)
          if (iachar(clean(i:i)) < 32 .or. iachar(clean(i:i)) == 127) clean(i:i) = '?'
       end do
-      if (len(text) <= limit) return
-      do i = limit, max(1, limit - 3), -1 ! never cut a UTF-8 sequence in two
-         if (iand(iachar(text(i + 1:i + 1)), 192) /= 128) exit
-         clean = clean(:i - 1)
+      if (len(text) > limit) then
+         do i = limit, max(1, limit - 3), -1 ! never cut a UTF-8 sequence in two
+            if (iand(iachar(text(i + 1:i + 1)), 192) /= 128) exit
+            clean = clean(:i - 1)
+         end do
+      end if
+      i = first_bad_byte(clean)
+      do while (i > 0)
+         clean(i:i) = '?'
+         i = first_bad_byte(clean)
       end do
-      clean = clean//'...'
+      if (len(text) > limit) clean = clean//'...'
    end function printable
 
    !> Levenshtein distance: insertions, deletions and substitutions of one character.

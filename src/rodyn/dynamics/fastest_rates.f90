@@ -9,7 +9,7 @@ module rodyn_fastest_rates
    use rodyn_accelerations, only: dynamics_type, new_dynamics
    implicit none (type, external)
    private
-   public :: fastest_rates, with_rigid_rods
+   public :: fastest_rates, with_rigid_rods, by_springs, by_dampers
 
    integer, parameter :: n_iterations = 40
    real(wp), parameter :: small_change = 1.0e-2_wp !! of the growth; three such in sequence end the iteration
@@ -81,7 +81,7 @@ contains
       end do
    end function with_rigid_rods
 
-   !> M^-1 K x, by central differences.
+   !> M^-1 K x, by central differences: x is of order one [rad].
    subroutine by_springs(dynamics, q, x, image, ok)
       type(dynamics_type), intent(inout) :: dynamics
       real(wp), intent(in) :: q(:), x(:)

@@ -55,6 +55,7 @@ module rodyn_case_config
       character(len=name_length) :: dampers = 'reduced'        !! 'reduced' or 'exact', matters when quasistatic
       integer :: gauss_points = 4                              !! points of the rule for the rod integrals
       character(len=name_length) :: kernel = 'recursive'       !! 'recursive' or 'assembled'
+      real(wp) :: deflection_limit = 0.06_wp                   !! deflection/length beyond which a run is warned of
    end type model_config
 
    !> &initial
@@ -98,6 +99,7 @@ module rodyn_case_config
       integer :: order = 0                          !! highest order; 0: the method's own choice
       real(wp) :: max_step = 0.0_wp                 !! [s]; 0: no bound
       real(wp) :: fixed_step = 0.0_wp               !! [s], 'erk', 'dop853', 'gauss'; 0: adaptive
+      logical :: allow_unstable = .false.           !! fixed steps beyond the method's stability limit
       integer :: max_steps = 1000000000             !! steps of the whole run
    end type solver_config
 

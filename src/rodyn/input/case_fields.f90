@@ -86,6 +86,7 @@ contains
       call visitor%word_field('dampers', model%dampers)
       call visitor%field('gauss_points', model%gauss_points)
       call visitor%word_field('kernel', model%kernel)
+      call visitor%field('deflection_limit', model%deflection_limit)
       call visitor%close_group()
    end subroutine visit_model
 
@@ -140,6 +141,7 @@ contains
       call visitor%field('order', solver%order)
       call visitor%field('max_step', solver%max_step)
       call visitor%field('fixed_step', solver%fixed_step)
+      call visitor%field('allow_unstable', solver%allow_unstable)
       call visitor%field('max_steps', solver%max_steps)
       call visitor%close_group()
    end subroutine visit_solver

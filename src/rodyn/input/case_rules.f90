@@ -261,8 +261,13 @@ contains
       if (.not. is_sound(checked, 'solver', 1, 'method')) return
       rule = order_rule(config%solver%method, config%solver%order)
       if (len(rule) > 0 .and. is_sound(checked, 'solver', 1, 'order')) call blame(checked, 'solver', 1, 'order', rule)
-      if (config%solver%fixed_step <= 0.0_wp .or. any(config%solver%method == ['erk   ', 'dop853', 'gauss '])) return
-      call blame(checked, 'solver', 1, 'fixed_step', "is possible with method = 'erk', 'dop853' or 'gauss' only")
+      if (.not. config%solver%fixed_step > 0.0_wp) return
+      if (.not. any(config%solver%method == ['erk   ', 'dop853', 'gauss '])) then
+         call blame(checked, 'solver', 1, 'fixed_step', "is possible with method = 'erk', 'dop853' or 'gauss' only")
+      else if (config%t_end/config%solver%max_steps > config%solver%fixed_step) then
+         call blame(checked, 'solver', 1, 'fixed_step', 'would make more than max_steps = '// &
+                    to_text(config%solver%max_steps)//' steps until t_end = '//short(config%t_end)//' [s]')
+      end if
    end subroutine check_solver
 
    !> What a method says against an order; empty if nothing.
@@ -381,6 +386,7 @@ contains
       character(len=16) :: digits
       write (digits, '(g0.6)') x
       text = trim(adjustl(digits))
+      if (text(1:1) == '.') text = '0'//text ! which some compilers leave out
    end function short
 
 end module rodyn_case_rules

@@ -81,6 +81,8 @@ module rodyn_case_schema
          help='points of the quadrature rule for the rod integrals'), &
       schema_row('model', 'kernel', type_word, default="'recursive'", words='recursive|assembled', &
          help='O(n) recursion, or the assembled system and LAPACK'), &
+      schema_row('model', 'deflection_limit', type_real, default='0.06', rule=positive, &
+         help='a run ends with a warning if a rod bends by more than this part of its length; its chord is then 1 % too long'), &
       schema_row('initial', 'phi', type_real, rods, 'rad', '0.0', &
          help='angle of each chord from the moving x axis'), &
       schema_row('initial', 'alpha', type_real, rods, 'rad', '0.0', &
@@ -141,6 +143,8 @@ module rodyn_case_schema
          help='longest step; 0: no bound'), &
       schema_row('solver', 'fixed_step', type_real, unit='s', default='0.0', rule=not_negative, &
          help="constant step of erk, dop853 or gauss; 0: adaptive"), &
+      schema_row('solver', 'allow_unstable', type_logical, default='.false.', &
+         help='take a fixed_step beyond the stability limit of erk or dop853, which is refused otherwise'), &
       schema_row('solver', 'max_steps', type_integer, default='1000000000', rule=at_least, low=1.0_wp, &
          help='most steps of the whole run'), &
       schema_row('output', 'file', type_text, default="''", rule=up_to, high=4096.0_wp, &

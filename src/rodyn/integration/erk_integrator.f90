@@ -27,7 +27,9 @@ module rodyn_erk_integrator
       FERKStepSetPostprocessStepFn
    implicit none (type, external)
    private
-   public :: erk_integrator, new_erk_integrator
+   public :: erk_integrator, new_erk_integrator, erk_tableau
+
+   integer, parameter :: lowest_order = 2, highest_order = 8
 
    !> struct ARKodeButcherTableMem of arkode_butcher.h
    type, bind(c) :: butcher_table
@@ -82,11 +84,9 @@ contains
       type(solver_options), intent(in) :: options
       type(error_type), allocatable, intent(out) :: error
 
-      integer, parameter :: lowest = 2, highest = 8
-
       self%order = options%order
-      if (self%order == 0) self%order = highest
-      if (self%order < lowest .or. self%order > highest) then
+      if (self%order == 0) self%order = highest_order
+      if (self%order < lowest_order .or. self%order > highest_order) then
          call raise(error, 'order: ''erk'' takes 2 to 8, or 0 for 8')
          return
       end if
@@ -162,10 +162,41 @@ contains
       class(erk_integrator), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
 
-      type(c_ptr) :: address, swap
+      type(c_ptr) :: address
+
+      call load_table(self%order, address, error)
+      if (allocated(error)) return
+      call copy_table(address, self%a, self%b, self%c)
+      allocate (self%rates(self%system%n_states, size(self%b)))
+      call check(error, FERKStepSetTable(self%memory, address), 'ERKStepSetTable')
+      call FARKodeButcherTable_Free(address)
+   end subroutine choose_table
+
+   !> Coefficients of the table of an order.
+   subroutine erk_tableau(order, a, b, c, error)
+      integer, intent(in) :: order                 !! 2 to 8; 0: the default
+      real(wp), allocatable, intent(out) :: a(:, :) !! (stages, stages): a(j, i) multiplies rate j in stage i
+      real(wp), allocatable, intent(out) :: b(:), c(:) !! (stages)
+      type(error_type), allocatable, intent(out) :: error
+
+      type(c_ptr) :: address
+
+      call load_table(merge(highest_order, order, order == 0), address, error)
+      if (allocated(error)) return
+      call copy_table(address, a, b, c)
+      call FARKodeButcherTable_Free(address)
+   end subroutine erk_tableau
+
+   !> SUNDIALS' table of an order, to be freed by the caller.
+   subroutine load_table(order, address, error)
+      integer, intent(in) :: order
+      type(c_ptr), intent(out) :: address
+      type(error_type), allocatable, intent(out) :: error
+
+      type(c_ptr) :: swap
       type(butcher_table), pointer :: table
 
-      select case (self%order)
+      select case (order)
       case (2); address = FARKodeButcherTable_LoadERK(ARKODE_HEUN_EULER_2_1_2)
       case (3); address = FARKodeButcherTable_LoadERK(ARKODE_BOGACKI_SHAMPINE_4_2_3)
       case (4); address = FARKodeButcherTable_LoadERK(ARKODE_ZONNEVELD_5_3_4)
@@ -177,18 +208,14 @@ contains
          call raise(error, 'ARKodeButcherTable_LoadERK: out of memory')
          return
       end if
+      if (order /= 7) return
       call c_f_pointer(address, table)
-      if (self%order == 7) then
-         swap = table%b
-         table%b = table%d
-         table%d = swap
-         table%order = 7_c_int
-         table%embedded_order = 8_c_int
-      end if
-      call copy_table(self, table)
-      call check(error, FERKStepSetTable(self%memory, address), 'ERKStepSetTable')
-      call FARKodeButcherTable_Free(address)
-   end subroutine choose_table
+      swap = table%b
+      table%b = table%d
+      table%d = swap
+      table%order = 7_c_int
+      table%embedded_order = 8_c_int
+   end subroutine load_table
 
    !> True if the last stage is the new state, so that its rate may begin the next step.
    !>
@@ -212,26 +239,27 @@ contains
    end function nothing_to_do
 
    !> The coefficients as arrays.
-   subroutine copy_table(self, table)
-      class(erk_integrator), intent(inout) :: self
-      type(butcher_table), intent(in) :: table
+   subroutine copy_table(address, a, b, c)
+      type(c_ptr), intent(in) :: address
+      real(wp), allocatable, intent(out) :: a(:, :), b(:), c(:)
 
+      type(butcher_table), pointer :: table
       type(c_ptr), pointer :: rows(:)
       real(c_double), pointer :: values(:)
       integer :: i, stages
 
+      call c_f_pointer(address, table)
       stages = table%stages
-      allocate (self%a(stages, stages))
+      allocate (a(stages, stages))
       call c_f_pointer(table%a, rows, [stages])
       do i = 1, stages
          call c_f_pointer(rows(i), values, [stages])
-         self%a(:, i) = values
+         a(:, i) = values
       end do
       call c_f_pointer(table%b, values, [stages])
-      self%b = values
+      b = values
       call c_f_pointer(table%c, values, [stages])
-      self%c = values
-      allocate (self%rates(self%system%n_states, stages))
+      c = values
    end subroutine copy_table
 
    !> Step past t_out, but never past the stop time; an output inside the last step gets a step of its own.

@@ -18,7 +18,7 @@ module rodyn_integrator
    implicit none (type, external)
    private
    public :: integrator_type, solver_options, solver_statistics, monitor_type
-   public :: time_text
+   public :: time_text, judged_steps, is_hopeless, hopeless_text
 
    !> What the user chooses of a method.
    type :: solver_options
@@ -27,6 +27,7 @@ module rodyn_integrator
       integer :: order = 0               !! highest order of a multistep method, order of a one-step method; 0: the default
       real(wp) :: max_step = 0.0_wp      !! [s]; 0: no bound
       real(wp) :: fixed_step = 0.0_wp    !! [s], one-step methods only; 0: adaptive
+      logical :: allow_unstable = .false. !! fixed steps beyond the stability limit, see `rodyn_step_limit`
       integer :: max_steps = 1000000000  !! internal steps of the whole run, restarts included
       logical :: stability_limit_detection = .true. !! BDF: lower the order where orders 3 to 5 are unstable
    end type solver_options
@@ -60,6 +61,8 @@ module rodyn_integrator
       real(wp), allocatable :: y_good(:)  !! state there (n_states)
       integer(i8) :: n_steps = 0          !! internal steps of the whole run
       integer(i8) :: n_starts = 0
+      integer(i8), private :: n_judged = 0     !! steps and time at the last look at the pace
+      real(wp), private :: t_judged = 0.0_wp   !! [s]
       integer(i8), private :: clock_report = 0, clock_look = 0 !! wall clock at the last report, the last look [counts]
       integer, private :: steps_to_look = 1, stride = 1        !! the clock is read every `stride` steps
    contains
@@ -121,6 +124,8 @@ module rodyn_integrator
    end interface
 
    real(wp), parameter :: report_interval = 0.2_wp !! wall time between two reports [s]
+   integer, parameter :: judged_steps = 1000       !! after so many, the pace is judged: enough for any first step to grow
+   real(wp), parameter :: hopeless = 1.0e12_wp     !! steps to the stop time: weeks for the smallest scene
 
 contains
 
@@ -165,6 +170,8 @@ contains
       self%t_good = t
       self%y_good = y
       self%n_starts = self%n_starts + 1
+      self%n_judged = self%n_steps
+      self%t_judged = t
    end subroutine begin_interval
 
    !> Refuse an output time beyond the stop time, or an integrator that was never started.
@@ -179,10 +186,11 @@ contains
       end if
    end subroutine check_target
 
-   !> Called before each internal step: counts it, refuses one too many, lets the monitor speak and stop the run.
+   !> Called before each internal step: counts it, refuses one too many, gives up where no end is in sight, lets the
+   !> monitor speak and stop the run.
    subroutine permit_step(self, error)
       class(integrator_type), intent(inout) :: self
-      type(error_type), allocatable, intent(out) :: error !! max_steps reached, or a stop was requested
+      type(error_type), allocatable, intent(out) :: error !! max_steps reached, no end in sight, or a stop was requested
 
       character(len=20) :: digits
 
@@ -190,6 +198,14 @@ contains
          write (digits, '(i0)') self%options%max_steps
          call raise(error, 'max_steps = '//trim(digits)//' reached at t = '//time_text(self%t_good)//' s')
          return
+      end if
+      if (self%n_steps >= self%n_judged + judged_steps) then
+         if (is_hopeless(self%t_good - self%t_judged, self%t_stop - self%t_good)) then
+            call raise(error, hopeless_text(self%t_good, self%t_good - self%t_judged))
+            return
+         end if
+         self%n_judged = self%n_steps
+         self%t_judged = self%t_good
       end if
       self%n_steps = self%n_steps + 1
       if (.not. associated(self%monitor)) return
@@ -201,6 +217,24 @@ contains
          call raise(error, 'stopped on request at t = '//time_text(self%t_good)//' s', exit_stopped)
       end if
    end subroutine permit_step
+
+   !> After `judged_steps` steps: would it take `hopeless` of them to get to the stop time?
+   pure logical function is_hopeless(done, left)
+      real(wp), intent(in) :: done !! time that these steps have covered [s]
+      real(wp), intent(in) :: left !! time to the stop time [s]
+      is_hopeless = done < left*(judged_steps/hopeless)
+   end function is_hopeless
+
+   !> The same in words.
+   pure function hopeless_text(t, done) result(text)
+      real(wp), intent(in) :: t    !! time reached [s]
+      real(wp), intent(in) :: done !! as above [s]
+      character(len=:), allocatable :: text
+      character(len=8) :: steps
+      write (steps, '(i0)') judged_steps
+      text = 'no end in sight at t = '//time_text(t)//' s: the last '//trim(steps)//' steps made '//time_text(done)// &
+             ' s; loads or initial values far out of proportion?'
+   end function hopeless_text
 
    !> Report when it is time, and choose how many steps to take until the next look: about 20 ms of them.
    subroutine look_at_clock(self)

@@ -22,7 +22,7 @@ module rodyn_lane_dop853
    use rodyn_errors, only: error_type, raise
    use rodyn_lanes, only: lanes
    use rodyn_lane_ode, only: lane_system
-   use rodyn_integrator, only: solver_options, solver_statistics, time_text
+   use rodyn_integrator, only: solver_options, solver_statistics, time_text, judged_steps, is_hopeless, hopeless_text
    use rodyn_text, only: to_text
    use rodyn_dop853_nystrom, only: n_stages, node, a, a2, b, b2, e5, e5_2, e3, e3_2
    implicit none (type, external)
@@ -50,6 +50,8 @@ module rodyn_lane_dop853
       real(wp) :: t_wanted = huge(1.0_wp) !! next output, not after t_stop; huge: none [s]
       real(wp) :: h_next = 0.0_wp    !! step to try next [s]
       integer :: event = at_nothing
+      integer(i8) :: n_judged = 0    !! steps and time at the last look at the pace
+      real(wp) :: t_judged = 0.0_wp  !! [s]
       logical :: rejected = .false.  !! the last try was
       logical :: refused = .false.   !! because the right-hand side said so
       type(solver_options) :: options
@@ -159,6 +161,8 @@ contains
          course%t_stop = t_stop
          course%t_wanted = t_wanted
          course%rejected = .false.
+         course%n_judged = course%counts%n_steps
+         course%t_judged = course%t
          course%counts%n_starts = course%counts%n_starts + 1
          call evaluate_one(self, lane, course%t, self%q, self%p, ok)
          if (.not. ok) then
@@ -288,6 +292,14 @@ contains
             call fail(self, lane, 'max_steps = '//to_text(course%options%max_steps)//' reached at t = '// &
                       time_text(course%t)//' s')
             return
+         end if
+         if (course%counts%n_steps >= course%n_judged + judged_steps) then
+            if (is_hopeless(course%t - course%t_judged, course%t_stop - course%t)) then
+               call fail(self, lane, hopeless_text(course%t, course%t - course%t_judged))
+               return
+            end if
+            course%n_judged = course%counts%n_steps
+            course%t_judged = course%t
          end if
          h = course%h_next
          course%t_new = course%t + (h - course%t_lost)

@@ -11,7 +11,7 @@ module rodyn_method_choice
    use rodyn_case_config, only: solver_config
    use rodyn_scene, only: scene_type
    use rodyn_fastest_rates, only: fastest_rates, with_rigid_rods
-   use rodyn_integrator, only: solver_options, time_text
+   use rodyn_integrator, only: monitor_type, solver_options, time_text
    use rodyn_method_trial, only: candidates, n_even, effort_of_nodes, try_methods
    implicit none (type, external)
    private
@@ -44,13 +44,14 @@ module rodyn_method_choice
 contains
 
    !> The user's method, or the one that fits.
-   subroutine choose_method(choice, solver, options, scene, y, t_end)
+   subroutine choose_method(choice, solver, options, scene, y, t_end, monitor)
       type(method_choice), intent(out) :: choice
       type(solver_config), intent(in) :: solver
       type(solver_options), intent(in) :: options !! of the user
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: y(:)  !! state at t = 0, without quadratures
       real(wp), intent(in) :: t_end !! [s]
+      class(monitor_type), target, intent(inout), optional :: monitor !! of the run; what is chosen after a stop is of no use
       real(wp) :: slow, explicit, expected(n_even), forecast(size(candidates))
       integer :: best
 
@@ -73,7 +74,7 @@ contains
          return
       end if
       call try_methods(scene, y, options, minval([t_end, pack(scene%loads%switches, scene%loads%switches > 0.0_wp)]), t_end, &
-                       expected, trial_share, forecast, choice%effort)
+                       expected, trial_share, forecast, choice%effort, monitor)
       forecast(:2) = forecast(:2)/lead ! dop853, gauss
       best = minloc(forecast, dim=1)
       choice%tried = .true.

@@ -3,12 +3,12 @@
 !> Effort is counted, not timed, so that the same scene gets the same method everywhere. The unit is one right-hand side;
 !> what else a step costs was measured (docs/performance.md, `bench_newton`).
 module rodyn_method_trial
-   use rodyn_kinds, only: wp
+   use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type
    use rodyn_lanes, only: lanes
    use rodyn_scene, only: scene_type
    use rodyn_motion, only: motion_type, new_motion
-   use rodyn_integrator, only: integrator_type, solver_options, solver_statistics
+   use rodyn_integrator, only: integrator_type, monitor_type, solver_options, solver_statistics
    use rodyn_integrators, only: new_integrator
    implicit none (type, external)
    private
@@ -30,6 +30,14 @@ module rodyn_method_trial
    real(wp), parameter :: clear_lead = 4.0_wp         !! of an implicit method, with which the trial ends
    real(wp), parameter :: own_share = 0.2_wp         !! of its own run that the best candidate is tried on
    real(wp), parameter :: sure_lead = 12.0_wp         !! of one over expectations, which may be wrong by 3
+
+   !> Passes on that someone wants an end, and no more: what a trial reports is not the run.
+   type, extends(monitor_type) :: trial_monitor
+      class(monitor_type), pointer :: outer => null()
+   contains
+      procedure :: report
+      procedure :: stop_requested
+   end type trial_monitor
 
    !> A run that can be continued; started when first continued.
    type :: runner
@@ -70,34 +78,39 @@ contains
    !>
    !> The pace of the even methods is known well enough beforehand where implicit ones leave them far behind. Only where
    !> they do not, the even ones are tried, with no more effort than the best implicit method needs for the whole run.
-   subroutine try_methods(scene, y, options, t_first, t_end, expected, share, forecast, effort)
+   subroutine try_methods(scene, y, options, t_first, t_end, expected, share, forecast, effort, monitor)
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: y(:)                  !! state at t = 0, without quadratures
       type(solver_options), intent(in) :: options
       real(wp), intent(in) :: t_first               !! end of the trial at the latest; no load switches before [s]
       real(wp), intent(in) :: t_end                 !! [s]
       real(wp), intent(in) :: expected(n_even)      !! effort of the even methods; huge: of no use here
-      real(wp), intent(in) :: share                 !! of the effort of the best even method, for one candidate at most
+      real(wp), intent(in) :: share                 !! of the effort of the best even method, for one candidate at most, but
+                                                    !! not more than `most_effort`
       real(wp), intent(out) :: forecast(size(candidates))
       real(wp), intent(out) :: effort               !! spent on the trial
+      class(monitor_type), target, intent(inout), optional :: monitor !! may end the trial, which then tells nothing
+      type(trial_monitor), target :: listener
       type(runner) :: runners(size(candidates))
       real(wp) :: allowed, budget
       integer :: i, best
 
+      if (present(monitor)) listener%outer => monitor
       forecast(:n_even) = expected
       allowed = first_effort
       do
          do i = n_even + 1, size(candidates)
             if (hopeless(runners(i), candidates(i), t_end/forecast(1))) cycle
-            call continue_runner(runners(i), candidates(i), scene, y, options, t_first, allowed)
+            call continue_runner(runners(i), candidates(i), scene, y, options, t_first, allowed, listener)
             forecast(i) = forecast_of(runners(i), t_end, candidates(i)%order == 2 .and. allowed > 3.0_wp*first_effort)
          end do
          best = n_even + minloc(forecast(n_even + 1:), dim=1)
          if (sure_lead*forecast(best) > minval(expected) .and. &
              (allowed > 3.0_wp*first_effort .or. any(runners%reached >= t_first))) call try_even()
-         if (any(runners%reached >= t_first)) exit
+         if (any(runners%reached >= t_first) .or. all(runners(n_even + 1:)%failed)) exit
          budget = share*minval(forecast(:n_even))
          if (forecast(best) < minval(forecast(:n_even))) budget = min(budget, own_share*forecast(best))
+         budget = min(budget, most_effort(scene))
          if (1.4_wp*allowed >= budget) exit ! a short round would tell nothing
          if (allowed > 3.0_wp*first_effort .and. clear_lead*forecast(best) < &
              minval(forecast, mask=[(i /= best, i=1, size(candidates))])) exit
@@ -116,12 +129,18 @@ contains
          do j = 1, n_even
             if (expected(j) > sure_lead*minval(expected) .or. runners(j)%effort > max(even_effort, 0.25_wp*allowed)) cycle
             call continue_runner(runners(j), candidates(j), scene, y, options, t_first, &
-                                 min(allowed, max(first_effort, forecast(best))))
+                                 min(allowed, max(first_effort, forecast(best))), listener)
             forecast(j) = forecast_of(runners(j), t_end, .false.)
          end do
       end subroutine try_even
 
    end subroutine try_methods
+
+   !> However long the run: what a candidate may spend in about a second, since a trial says nothing and cannot be stopped.
+   pure real(wp) function most_effort(scene)
+      type(scene_type), intent(in) :: scene
+      most_effort = 5.0e6_wp/(1.0_wp + 0.37_wp*scene%n)
+   end function most_effort
 
    !> An implicit method that vibrations hold back goes on at its even pace.
    pure logical function hopeless(self, candidate, explicit_pace)
@@ -157,13 +176,14 @@ contains
       end do
    end function forecast_of
 
-   subroutine start_runner(self, candidate, scene, y, options, t_end)
+   subroutine start_runner(self, candidate, scene, y, options, t_end, listener)
       type(runner), intent(inout) :: self
       type(candidate_type), intent(in) :: candidate
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: y(:)
       type(solver_options), intent(in) :: options
       real(wp), intent(in) :: t_end
+      type(trial_monitor), target, intent(inout) :: listener
       type(solver_options) :: own
       type(error_type), allocatable :: error
 
@@ -177,6 +197,7 @@ contains
          call new_integrator(self%integrator, self%motion, trim(candidate%method), own, error)
       end if
       if (.not. allocated(error)) then
+         if (associated(listener%outer)) call self%integrator%set_monitor(listener)
          call self%integrator%set_stop(t_end)
          call self%integrator%start(0.0_wp, y, error)
       end if
@@ -184,19 +205,20 @@ contains
    end subroutine start_runner
 
    !> Go on until the effort is spent, or the end or a failure is met.
-   subroutine continue_runner(self, candidate, scene, y, options, t_end, allowed)
+   subroutine continue_runner(self, candidate, scene, y, options, t_end, allowed, listener)
       type(runner), intent(inout) :: self
       type(candidate_type), intent(in) :: candidate
       type(scene_type), intent(in) :: scene
       type(solver_options), intent(in) :: options
       real(wp), intent(in) :: y(:), t_end, allowed
+      type(trial_monitor), target, intent(inout) :: listener
       integer, parameter :: n_slices = 4 ! a slice too long costs no more than a quarter of what is allowed
       type(error_type), allocatable :: error
       type(solver_statistics) :: stats
       real(wp) :: state(size(y)), per_step, effort_before, reached_before, pace_before
       integer :: steps
 
-      if (.not. associated(self%motion)) call start_runner(self, candidate, scene, y, options, t_end)
+      if (.not. associated(self%motion)) call start_runner(self, candidate, scene, y, options, t_end, listener)
       effort_before = self%effort
       reached_before = self%reached
       pace_before = self%pace
@@ -215,5 +237,19 @@ contains
       self%pace = (self%reached - reached_before)/(self%effort - effort_before)
       if (pace_before > 0.0_wp) self%growth = [self%pace/pace_before, self%growth(1)]
    end subroutine continue_runner
+
+   !> Nothing.
+   subroutine report(self, t, n_steps)
+      class(trial_monitor), intent(inout) :: self
+      real(wp), intent(in) :: t
+      integer(i8), intent(in) :: n_steps
+      associate (unused => self, unused_t => t, unused_n => n_steps); end associate
+   end subroutine report
+
+   function stop_requested(self) result(requested)
+      class(trial_monitor), intent(in) :: self
+      logical :: requested
+      requested = self%outer%stop_requested()
+   end function stop_requested
 
 end module rodyn_method_trial

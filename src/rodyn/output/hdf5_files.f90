@@ -17,13 +17,14 @@ module rodyn_hdf5_files
       h5gcreate_f, h5gclose_f, h5gget_info_by_name_f, h5lexists_f, h5lget_name_by_idx_f, h5_index_name_f, h5_iter_inc_f, &
       h5screate_f, h5screate_simple_f, h5sclose_f, h5s_scalar_f, h5s_unlimited_f, h5s_select_set_f, &
       h5sselect_hyperslab_f, h5sget_simple_extent_ndims_f, h5sget_simple_extent_dims_f, &
+      h5sget_simple_extent_npoints_f, &
       h5tcopy_f, h5tclose_f, h5tset_size_f, h5tset_strpad_f, h5tset_cset_f, h5tget_size_f, h5tget_class_f, h5t_string_f, &
       h5tis_variable_str_f, &
       h5t_str_nullpad_f, h5t_cset_utf8_f, h5t_fortran_s1, h5t_ieee_f64le, h5t_std_i32le, h5t_std_i64le, &
       h5t_native_double, h5t_string, h5kind_to_type, h5_integer_kind, &
       h5dcreate_f, h5dopen_f, h5dclose_f, h5dwrite_f, h5dread_f, h5dset_extent_f, h5dget_space_f, &
       h5acreate_by_name_f, h5aopen_by_name_f, h5aexists_by_name_f, h5adelete_by_name_f, h5aclose_f, h5awrite_f, &
-      h5aread_f, h5aget_type_f
+      h5aread_f, h5aget_type_f, h5aget_space_f
    use h5ds, only: h5dsset_scale_f, h5dsattach_scale_f
    use rodyn_errors, only: error_type, raise
    use rodyn_kinds, only: wp
@@ -33,6 +34,7 @@ module rodyn_hdf5_files
 
    integer, parameter :: max_rank = 7
    integer, parameter :: name_length = 256 !! longest member name `members` returns whole
+   integer(size_t), parameter :: longest_text = 256*1024*1024 !! of an attribute [bytes]
 
    !> An open file. Leaving the scope closes it, silently: call `close` to hear of failures.
    type :: hdf5_file
@@ -734,7 +736,7 @@ contains
       call h5dclose_f(set, status)
    end subroutine read_whole
 
-   !> Read a text attribute of fixed length, without its padding nulls.
+   !> Read a text attribute, scalar and of fixed length, without its padding nulls.
    subroutine get_text(self, object, name, value, error)
       class(hdf5_file), intent(in) :: self
       character(len=*), intent(in) :: object !! '/' for the root
@@ -744,17 +746,14 @@ contains
       integer(hid_t) :: attribute, text_type
       integer(size_t) :: length
       integer :: status, used
-      logical :: variable
 
       call h5aopen_by_name_f(self%id, object, name, attribute, status)
       if (self%failed(status, 'h5aopen_by_name_f', object//'@'//name, error)) return
       work: block
          call h5aget_type_f(attribute, text_type, status)
          if (self%failed(status, 'h5aget_type_f', object//'@'//name, error)) exit work
-         call h5tis_variable_str_f(text_type, variable, status)
-         call h5tget_size_f(text_type, length, status)
-         if (variable) then
-            call raise(error, "'"//object//'@'//name//"' of "//self%path//' is not a text of fixed length')
+         if (.not. is_plain_text(attribute, text_type, length)) then
+            call raise(error, "'"//object//'@'//name//"' of "//self%path//' is not a scalar text of fixed length')
          else
             allocate (character(len=length) :: value)
             call h5aread_f(attribute, text_type, value, [1_hsize_t], status)
@@ -767,6 +766,31 @@ contains
       used = verify(value, achar(0), back=.true.)
       value = value(:used)
    end subroutine get_text
+
+   !> Is an attribute one text of fixed length? Files may be damaged, or of other programs.
+   logical function is_plain_text(attribute, text_type, length)
+      integer(hid_t), intent(in) :: attribute, text_type
+      integer(size_t), intent(out) :: length !! bytes
+      integer(hid_t) :: space
+      integer(hsize_t) :: n_points
+      integer :: class, rank, status
+      logical :: variable
+
+      length = 0
+      is_plain_text = .false.
+      call h5tget_class_f(text_type, class, status)
+      if (status < 0 .or. class /= h5t_string_f) return
+      call h5tis_variable_str_f(text_type, variable, status)
+      if (status < 0 .or. variable) return
+      call h5aget_space_f(attribute, space, status)
+      if (status < 0) return
+      call h5sget_simple_extent_ndims_f(space, rank, status)
+      call h5sget_simple_extent_npoints_f(space, n_points, status) ! none in a null space
+      is_plain_text = status >= 0 .and. rank == 0 .and. n_points == 1
+      call h5sclose_f(space, status)
+      call h5tget_size_f(text_type, length, status)
+      is_plain_text = is_plain_text .and. status >= 0 .and. length <= longest_text
+   end function is_plain_text
 
    subroutine get_real(self, object, name, value, error)
       class(hdf5_file), intent(in) :: self

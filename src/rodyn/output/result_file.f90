@@ -6,11 +6,13 @@ module rodyn_result_file
    use rodyn_build_info, only: compiler, compiler_options, git_commit, program_version
    use rodyn_errors, only: error_type, exit_bad_input, raise
    use rodyn_hdf5_files, only: hdf5_file, hdf5_version
-   use rodyn_posix, only: host_name, ignore_file_size_signal, is_directory, is_writable, parent_directory, path_exists, &
-      process_id, remove_file, rename_new, rename_over, sync_path, utc_now
+   use rodyn_posix, only: host_name, ignore_file_size_signal, is_directory, is_special, is_writable, parent_directory, &
+      path_exists, process_id, remove_file, rename_new, rename_over, sync_path, utc_now
    implicit none (type, external)
    private
    public :: provenance, result_file, check_output_path, text_or_empty
+
+   integer, parameter :: longest_name = 255 - 24, longest_path = 4095 - 24 !! of Linux, less what temporary names add [bytes]
 
    !> What a result is the result of.
    type :: provenance
@@ -48,8 +50,12 @@ contains
       directory = parent_directory(path)
       if (len(path) == 0) then
          call raise(error, 'the name of the output file is empty', exit_bad_input)
+      else if (len(path) - index(path, '/', back=.true.) > longest_name .or. len(path) > longest_path) then
+         call raise(error, path//': the name of the output file is too long', exit_bad_input)
       else if (is_directory(path)) then
          call raise(error, path//': is a directory; give the name of a file', exit_bad_input)
+      else if (is_special(path)) then
+         call raise(error, path//': is a device or a pipe; give the name of a file', exit_bad_input)
       else if (path_exists(path) .and. .not. force) then
          call raise(error, path//': exists already; --force replaces it', exit_bad_input)
       else if (.not. path_exists(directory)) then

@@ -18,7 +18,7 @@ module rodyn_run_file
       n_run_variables, run_coordinates, run_variables, solver_group
    implicit none (type, external)
    private
-   public :: run_file, run_header, run_row, solver_report, new_run_row, check_output_path
+   public :: run_file, run_header, run_row, solver_report, new_run_row, is_finite, check_output_path
 
    integer, parameter :: block_bytes = 2*1024*1024 !! memory for rows that wait to be written
    integer, parameter :: most_block_rows = 4096
@@ -78,6 +78,7 @@ module rodyn_run_file
       integer(i8) :: n_error_test_failures = 0_i8
       integer(i8) :: n_restarts = 0_i8            !! at switches of loads
       real(wp) :: wall_seconds = 0.0_wp
+      character(len=:), allocatable :: warnings   !! where the model does not hold, one line each; a root attribute
    end type solver_report
 
    !> Rows of one data set that wait to be written.
@@ -117,6 +118,19 @@ contains
       allocate (row%phi_rate(n_rods), row%alpha_rate(n_rods), row%beta_rate(n_rods), source=0.0_wp)
       allocate (row%bubble(n_rods), row%bubble_rate(n_rods), source=0.0_wp)
    end function new_run_row
+
+   !> Are all numbers of a row finite?
+   pure logical function is_finite(row)
+      type(run_row), intent(in) :: row
+      real(wp), parameter :: most = huge(1.0_wp)
+
+      is_finite = all(abs([row%velocity_x, row%velocity_y, row%omega, row%displacement_x, row%displacement_y, row%rotation, &
+                           row%energy_kinetic, row%energy_elastic, row%energy_dissipated, row%work_external, &
+                           row%energy_residual, row%momentum_x, row%momentum_y, row%angular_momentum]) <= most)
+      is_finite = is_finite .and. all(abs(row%phi) <= most) .and. all(abs(row%phi_rate) <= most)
+      is_finite = is_finite .and. all(abs(row%alpha) <= most) .and. all(abs(row%alpha_rate) <= most)
+      is_finite = is_finite .and. all(abs(row%beta) <= most) .and. all(abs(row%beta_rate) <= most)
+   end function is_finite
 
    !> Let the finished file have another name, replacing what has it: the rows of a stopped run do not take the
    !> place of its result.
@@ -221,6 +235,7 @@ contains
       call self%write_waiting_rows(error)
       if (.not. allocated(error)) call self%write_solver_report(report, error)
       if (.not. allocated(error)) call self%file%put_attribute('/', 't_reached', self%last_time, error)
+      if (.not. allocated(error)) call self%file%put_attribute('/', 'warnings', text_or_empty(report%warnings), error)
       if (.not. allocated(error) .and. present(message)) call self%file%put_attribute('/', 'message', message, error)
       if (allocated(error)) then
          call self%discard()

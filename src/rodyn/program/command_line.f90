@@ -3,15 +3,16 @@ module rodyn_command_line
    use, intrinsic :: iso_fortran_env, only: error_unit
    use rodyn_errors, only: error_type, raise, exit_done, exit_bad_input
    use rodyn_case_config, only: case_config
-   use rodyn_case_reader, only: read_case, default_case
-   use rodyn_file_text, only: read_text_file
+   use rodyn_case_reader, only: default_case, parse_case
+   use rodyn_input_texts, only: input_texts, is_result_file, read_input_texts
    use rodyn_modal_analysis, only: analyse_modes
    use rodyn_posix_files, only: watch_signals
-   use rodyn_run, only: run_case
+   use rodyn_run, only: check_steps, run_case
    use rodyn_posix, only: same_path, write_output
+   use rodyn_scene, only: scene_type, new_scene
    use rodyn_sweep_config, only: sweep_config
    use rodyn_sweep_engine, only: run_sweep, sweep_options
-   use rodyn_sweep_reader, only: default_sweep, is_sweep_text, read_sweep
+   use rodyn_sweep_reader, only: default_sweep, parse_sweep
    use rodyn_build_info, only: program_version, git_commit
    implicit none (type, external)
    private
@@ -92,15 +93,23 @@ contains
       type(options_type), intent(in) :: options
       type(error_type), allocatable, intent(out) :: error
       type(case_config) :: config
-      character(len=:), allocatable :: text, path
+      type(input_texts) :: input
+      character(len=:), allocatable :: path
 
-      call read_case(options%file, config, text, error)
+      call read_input_texts(options%file, input, error)
       if (allocated(error)) return
-      path = output_path(options, config)
+      if (input%is_sweep) then
+         call raise(error, options%file//': is a sweep; rodyn sweep computes it', exit_bad_input)
+         return
+      end if
+      call parse_case(input%text, input%name, config, error)
+      if (allocated(error)) return
+      path = output_path(options, config, input%from_result)
       call refuse_input(path, options%file, error)
+      if (.not. allocated(error)) call refuse_steps(options, config, error)
       if (allocated(error)) return
       call watch_signals()
-      call run_case(config, path, error, input_text=text, force=options%force, quiet=options%quiet)
+      call run_case(config, path, error, input_text=input%text, force=options%force, quiet=options%quiet)
    end subroutine run_file_command
 
    !> The result must not take the place of the case.
@@ -116,14 +125,22 @@ contains
       type(options_type), intent(in) :: options
       type(error_type), allocatable, intent(out) :: error
       type(case_config) :: config
-      character(len=:), allocatable :: text, path
+      type(input_texts) :: input
+      character(len=:), allocatable :: path
 
-      call read_case(options%file, config, text, error)
+      call read_input_texts(options%file, input, error)
+      if (allocated(error)) return
+      if (input%is_sweep) then
+         call raise(error, options%file//': is a sweep; modes are those of one case', exit_bad_input)
+         return
+      end if
+      call parse_case(input%text, input%name, config, error)
       if (allocated(error)) return
       path = base_name(options%file)//'_modes.h5'
       if (allocated(options%output)) path = options%output
       call refuse_input(path, options%file, error)
-      if (.not. allocated(error)) call analyse_modes(config, path, options%equilibrium, options%loads, error, input_text=text, &
+      if (.not. allocated(error)) call analyse_modes(config, path, options%equilibrium, options%loads, error, &
+                                                     input_text=input%text, &
                                                      force=options%force, quiet=options%quiet)
    end subroutine modes_command
 
@@ -133,17 +150,29 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(case_config) :: config
       type(sweep_config) :: sweep
-      character(len=:), allocatable :: text
+      type(scene_type) :: scene
+      type(input_texts) :: input
 
-      call read_text_file(options%file, text, error)
+      call read_input_texts(options%file, input, error)
       if (allocated(error)) return
-      if (is_sweep_text(text)) then
-         call read_sweep(options%file, sweep, error)
+      if (input%is_sweep) then
+         call parse_sweep(input%text, input%name, input%base_text, input%base_name, .true., sweep, error)
       else
-         call read_case(options%file, config, error=error)
+         call parse_case(input%text, input%name, config, error)
+         if (.not. allocated(error)) call new_scene(scene, config, error) ! numbers that are finite, but not what follows from them
+         if (.not. allocated(error)) call refuse_steps(options, config, error)
       end if
       if (.not. allocated(error) .and. .not. options%quiet) call print_text(options%file//': valid', error)
    end subroutine check_command
+
+   !> Steps that no method can take, told with the name of the file.
+   subroutine refuse_steps(options, config, error)
+      type(options_type), intent(in) :: options
+      type(case_config), intent(in) :: config
+      type(error_type), allocatable, intent(out) :: error
+      call check_steps(config, error)
+      if (allocated(error)) error%message = options%file//': '//error%message
+   end subroutine refuse_steps
 
    !> rodyn sweep
    subroutine sweep_command(options, exit_code, error)
@@ -155,6 +184,7 @@ contains
       exit_code = exit_bad_input
       sweep%file = options%file
       sweep%output = base_name(options%file)
+      if (is_result_file(options%file)) sweep%output = sweep%output//'-again'
       if (allocated(options%output)) sweep%output = options%output
       sweep%dry_run = options%dry_run
       sweep%retry_failed = options%retry_failed
@@ -225,21 +255,23 @@ contains
       end select
    end subroutine defaults_command
 
-   !> Where the result goes: --output, or &output file, or the case's own name with .h5.
-   function output_path(options, config) result(path)
+   !> Where the result goes: --output, or &output file, or the case's own name with .h5. A run that is made again from
+   !> its result never takes that one's name.
+   function output_path(options, config, again) result(path)
       type(options_type), intent(in) :: options
       type(case_config), intent(in) :: config
+      logical, intent(in) :: again !! the case is that of a result
       character(len=:), allocatable :: path
 
       if (allocated(options%output)) then
          path = options%output
          return
       end if
-      if (allocated(config%output%file)) then
+      if (allocated(config%output%file) .and. .not. again) then
          path = config%output%file
          if (len(path) > 0) return
       end if
-      path = base_name(options%file)//'.h5'
+      path = base_name(options%file)//trim(merge('-again.h5', '.h5      ', again))
    end function output_path
 
    !> Arguments behind the command.
@@ -319,6 +351,7 @@ contains
       case ('run')
          text = 'rodyn run CASE.nml [--output FILE.h5] [--force] [--quiet]'//nl// &
                 '  Integrate one scene and write its HDF5 file (default: CASE.h5 in the working directory).'//nl// &
+                '  The case may be a result of an earlier run: its stored input is run again (default: CASE-again.h5).'//nl// &
                 '  --output FILE.h5   name of the result'//nl// &
                 '  --force            replace an existing result'//nl// &
                 '  --quiet            print nothing but errors'//nl// &
@@ -340,6 +373,7 @@ contains
          text = 'rodyn sweep SWEEP.nml [--output DIR] [--shard I/N] [--dry-run] [--retry-failed] [--force] [--quiet]'//nl// &
                 '  Compute many variants of a case; the result is DIR/sweep.h5 (default: SWEEP in the working directory).'//nl// &
                 '  Run the same command again to resume; under mpirun or srun the ranks share the cases.'//nl// &
+                '  A sweep.h5 in place of SWEEP.nml is computed anew from its stored input (default: sweep-again).'//nl// &
                 '  --output DIR       directory of results; made if it does not exist'//nl// &
                 '  --shard I/N        every N-th case, beginning with the I-th; the last shard to end merges all'//nl// &
                 '  --dry-run          print the table of cases, and an estimate of time and disk'//nl// &
@@ -350,7 +384,8 @@ contains
                 '75 stopped by SIGTERM, SIGUSR1 or SIGINT.'
       case ('check')
          text = 'rodyn check FILE.nml [--quiet]'//nl// &
-                '  Validate only: print every fault of the file at once. Exit code 0 or 2.'
+                '  Validate only: print every fault of the file at once; of a result, those of its stored input.'//nl// &
+                '  Exit code 0 or 2.'
       case ('defaults')
          text = 'rodyn defaults [run|sweep]'//nl// &
                 '  Print a complete commented namelist with every key and its default.'

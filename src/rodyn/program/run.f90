@@ -13,13 +13,16 @@ module rodyn_run
    use rodyn_method_choice, only: method_choice, choose_method
    use rodyn_simulation, only: observer_type, simulate
    use rodyn_ledger, only: fill_row
-   use rodyn_run_file, only: run_file, run_header, run_row, solver_report, new_run_row, check_output_path
+   use rodyn_run_needs, only: check_needs
+   use rodyn_run_file, only: run_file, run_header, run_row, solver_report, new_run_row, is_finite, check_output_path
    use rodyn_progress, only: progress_monitor, new_progress
    use rodyn_description, only: describe_scene
    use rodyn_notes, only: notes_on
+   use rodyn_step_limit, only: check_fixed_step
+   use rodyn_validity, only: validity_type, new_validity
    implicit none (type, external)
    private
-   public :: run_case, options_of
+   public :: run_case, check_steps, options_of
 
    !> Takes rows down into the run file.
    type, extends(observer_type) :: recorder_type
@@ -29,6 +32,7 @@ module rodyn_run
       logical :: started = .false.
       real(wp) :: worst_residual = 0.0_wp !! of the ledger [J]
       real(wp) :: energy_scale = 0.0_wp   !! largest energy so far [J]
+      type(validity_type) :: validity
    contains
       procedure :: observe
    end type recorder_type
@@ -67,16 +71,20 @@ contains
       call system_clock(clock_start, clock_rate)
 
       call check_output_path(path, replace, error)
+      if (.not. allocated(error)) call check_needs(config, path, error)
       if (.not. allocated(error)) call new_scene(scene, config, error)
       if (.not. allocated(error)) call new_motion(motion, scene, config%output%ledger, error)
       if (allocated(error)) return
       call initial_state(motion, config%initial, y)
-      call choose_method(choice, config%solver, options_of(config), scene, y(:motion%n_controlled), config%t_end)
+      progress = new_progress(0.0_wp, config%t_end, silent)
+      call choose_method(choice, config%solver, options_of(config), scene, y(:motion%n_controlled), config%t_end, progress)
+      call check_fixed_step(choice%method, choice%options, scene, y, config%t_end, error)
+      if (allocated(error)) return
       header%notes = notes_on(scene, y(:scene%n_dof), config%output%ledger)
       if (.not. silent) then
          write (output_unit, '(a)') describe_scene(scene, config%output%ledger)
          write (output_unit, '(a)') 'method  '//choice%method//': '//choice%reason()
-         call print_notes(header%notes)
+         call print_lines('note   ', header%notes)
       end if
       call new_integrator(integrator, motion, choice%method, choice%options, error)
       if (allocated(error)) return
@@ -94,7 +102,7 @@ contains
       call recorder%file%create(path, header, replace, error)
       if (allocated(error)) return
       recorder%row = new_run_row(scene%n)
-      progress = new_progress(0.0_wp, config%t_end, silent)
+      recorder%validity = new_validity(scene, config%model%deflection_limit)
       call integrator%set_monitor(progress)
       call simulate(motion, integrator, [(config%t_end*(real(i, wp)/config%n_outputs), i=0, config%n_outputs)], &
                     config%t_end, recorder, y, t, failure)
@@ -105,7 +113,7 @@ contains
          if (failure%exit_code == exit_stopped) written = path//'.stopped'
       end if
       if (written /= path) call recorder%file%redirect(written)
-      call close_file(recorder%file, integrator, choice, config, scene, failure, &
+      call close_file(recorder, integrator, choice, config, scene, failure, &
                       real(clock_end - clock_start, wp)/real(clock_rate, wp), error)
       if (.not. silent .and. .not. allocated(error)) &
          call print_result(integrator, recorder, written, config, t, &
@@ -117,6 +125,22 @@ contains
          call move_alloc(failure, error)
       end if
    end subroutine run_case
+
+   !> What `run_case` would refuse of the steps of a case, exit code 2: see `rodyn_step_limit`.
+   subroutine check_steps(config, error)
+      type(case_config), intent(in) :: config
+      type(error_type), allocatable, intent(out) :: error
+      type(scene_type) :: scene
+      type(motion_type) :: motion
+      real(wp), allocatable :: y(:)
+
+      if (.not. config%solver%fixed_step > 0.0_wp) return
+      call new_scene(scene, config, error)
+      if (.not. allocated(error)) call new_motion(motion, scene, .false., error)
+      if (allocated(error)) return
+      call initial_state(motion, config%initial, y)
+      call check_fixed_step(trim(config%solver%method), options_of(config), scene, y, config%t_end, error)
+   end subroutine check_steps
 
    !> Take down one row.
    subroutine observe(self, motion, t, y, error)
@@ -133,8 +157,13 @@ contains
       end if
       self%started = .true.
       call fill_row(motion, t, y, self%initial_energy, self%row)
+      if (.not. is_finite(self%row)) then
+         call raise(error, 'at t = '//time_text(t)//' s: states or energies beyond all numbers')
+         return
+      end if
       self%worst_residual = max(self%worst_residual, abs(self%row%energy_residual))
       self%energy_scale = max(self%energy_scale, self%row%energy_kinetic + self%row%energy_elastic)
+      call self%validity%observe(self%row)
       call self%file%append(self%row, error)
    end subroutine observe
 
@@ -144,13 +173,14 @@ contains
       type(solver_options) :: options
       associate (solver => config%solver)
          options = solver_options(rtol=solver%rtol, atol=solver%atol, order=solver%order, max_step=solver%max_step, &
-                                  fixed_step=solver%fixed_step, max_steps=solver%max_steps)
+                                  fixed_step=solver%fixed_step, allow_unstable=solver%allow_unstable, &
+                                  max_steps=solver%max_steps)
       end associate
    end function options_of
 
    !> Attributes of the solver, status, and the final name.
-   subroutine close_file(file, integrator, choice, config, scene, failure, seconds, error)
-      type(run_file), intent(inout) :: file
+   subroutine close_file(recorder, integrator, choice, config, scene, failure, seconds, error)
+      type(recorder_type), intent(inout) :: recorder
       class(integrator_type), intent(inout) :: integrator
       type(method_choice), intent(in) :: choice
       type(case_config), intent(in) :: config
@@ -178,28 +208,29 @@ contains
       report%n_error_test_failures = stats%n_error_test_failures
       report%n_restarts = max(0_i8, stats%n_starts - 1_i8)
       report%wall_seconds = seconds
+      report%warnings = recorder%validity%warnings()
       if (.not. allocated(failure)) then
-         call file%finish('done', report, error)
+         call recorder%file%finish('done', report, error)
       else if (failure%exit_code == exit_stopped) then
-         call file%finish('stopped', report, error, failure%message)
+         call recorder%file%finish('stopped', report, error, failure%message)
       else
-         call file%finish('failed', report, error, failure%message)
+         call recorder%file%finish('failed', report, error, failure%message)
       end if
    end subroutine close_file
 
-   !> Each note on a line of its own.
-   subroutine print_notes(notes)
-      character(len=*), intent(in) :: notes !! lines
+   !> Each line of a text behind a word.
+   subroutine print_lines(word, text)
+      character(len=*), intent(in) :: word, text
       integer :: first, last
 
       first = 1
-      do while (first <= len(notes))
-         last = index(notes(first:), new_line('a')) + first - 2
-         if (last < first) last = len(notes)
-         write (output_unit, '(a)') 'note    '//notes(first:last)
+      do while (first <= len(text))
+         last = index(text(first:), new_line('a')) + first - 2
+         if (last < first) last = len(text)
+         write (output_unit, '(a)') word//' '//text(first:last)
          first = last + 2
       end do
-   end subroutine print_notes
+   end subroutine print_lines
 
    !> Last lines on the terminal.
    subroutine print_result(integrator, recorder, path, config, t, seconds, failure)
@@ -221,6 +252,7 @@ contains
          stats%n_rhs, ' right-hand sides, '//trim(adjustl(duration))//' s'
       if (config%output%ledger) write (output_unit, '(a, es8.1, a, es8.1, a)') 'ledger  largest energy residual ', &
          recorder%worst_residual, ' J of ', recorder%energy_scale, ' J'
+      call print_lines('warning', recorder%validity%warnings())
       write (output_unit, '(a)') 'file    '//path
    end subroutine print_result
 

@@ -177,7 +177,8 @@ contains
             if (.not. ok) then
                write (number, '(i0)') k
                call raise(error, '&chain: rod '//trim(number)//' has no bending inertia or stiffness: dynamic bending needs '// &
-                          'mass_per_length > 0, bending_stiffness > 0 and gauss_points >= 2', exit_bad_input)
+                          'mass_per_length > 0, bending_stiffness > 0, gauss_points >= 2, and m l^3 that is a number', &
+                          exit_bad_input)
                return
             end if
             scene%bending(j) = new_bending_matrices(rods(j), scene%n_bend, scene%consistent)

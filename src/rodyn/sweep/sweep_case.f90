@@ -23,7 +23,9 @@ module rodyn_sweep_case
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_simulation, only: observer_type, simulate
    use rodyn_sweep_config, only: sweep_config, is_ratio, value_text
+   use rodyn_step_limit, only: check_fixed_step
    use rodyn_sweep_plan, only: sweep_plan
+   use rodyn_validity, only: validity_type, new_validity
    implicit none (type, external)
    private
    public :: case_result, case_shape, pulse_type, keeper_type, build_case, build_values, new_case_shape
@@ -97,6 +99,7 @@ module rodyn_sweep_case
       integer, allocatable :: output_of(:)   !! row of the series of each time; 0: none
       logical :: keep_series = .false.
       integer :: seen = 0                    !! times so far
+      type(validity_type) :: validity
       type(case_result), pointer :: kept => null()
    contains
       procedure :: observe
@@ -242,21 +245,26 @@ contains
    end subroutine make_nan
 
    !> Everything about a case that comes before its integration, frequencies among it. `keeper%kept` is the caller's to set.
-   subroutine prepare_case(sweep, plan, shape, case, motion, y, times, t_end, keeper, choice, error)
+   subroutine prepare_case(sweep, plan, shape, case, pulse, clock_start, motion, y, times, t_end, keeper, choice, late, error)
       type(sweep_config), intent(in) :: sweep
       type(sweep_plan), intent(in) :: plan
       type(case_shape), intent(in) :: shape
       integer, intent(in) :: case
+      class(pulse_type), target, intent(inout) :: pulse
+      integer(i8), intent(in) :: clock_start         !! when work on the case began [counts]
       type(motion_type), intent(inout) :: motion
       real(wp), allocatable, intent(out) :: y(:)     !! state at t = 0
       real(wp), allocatable, intent(out) :: times(:) !! at which the keeper wants to see it [s]
       real(wp), intent(out) :: t_end                 !! [s]
       type(keeper_type), intent(inout) :: keeper
       type(method_choice), intent(out) :: choice
+      logical, target, intent(out) :: late           !! the choice of the method alone took longer than the case may
       type(error_type), allocatable, intent(out) :: error
       type(case_config) :: config
       type(scene_type) :: scene
+      type(case_monitor), target :: monitor
 
+      late = .false.
       t_end = 0.0_wp
       call build_case(sweep, plan, case, config, error)
       if (.not. allocated(error)) call new_scene(scene, config, error)
@@ -266,8 +274,16 @@ contains
       if (sweep%frequencies > 0) call keep_frequencies(scene, config, keeper%kept, error)
       if (allocated(error) .or. .not. sweep%integrate) return
       call initial_state(motion, config%initial, y)
-      call choose_method(choice, config%solver, options_of(config), scene, y, t_end)
+      monitor = new_monitor(sweep, pulse, clock_start, late)
+      call choose_method(choice, config%solver, options_of(config), scene, y, t_end, monitor)
+      if (choice%tried) then
+         if (monitor%stop_requested()) call raise(error, 'stopped on request at t = 0 s', exit_stopped)
+         if (allocated(error)) return
+      end if
+      call check_fixed_step(choice%method, choice%options, scene, y, t_end, error)
+      if (allocated(error)) return
       keeper%row = new_run_row(scene%n)
+      keeper%validity = new_validity(scene, config%model%deflection_limit)
       keeper%n_rods = shape%n_rods
       keeper%keep_series = sweep%keep_series
       call merge_times(config, sweep%probe_times, shape%outputs, times, keeper%probe_of, keeper%output_of)
@@ -318,10 +334,7 @@ contains
       late = .false.
       call new_integrator(integrator, motion, choice%method, choice%options, error)
       if (allocated(error)) return
-      monitor%pulse => pulse
-      monitor%clock_start = clock_start
-      monitor%limit = sweep%case_seconds
-      monitor%late => late
+      monitor = new_monitor(sweep, pulse, clock_start, late)
       call integrator%set_monitor(monitor)
       call system_clock(clock_a, clock_rate)
       call simulate(motion, integrator, times, t_end, keeper, y, keeper%kept%t_reached, error)
@@ -346,8 +359,26 @@ contains
          return
       end if
       call fill_row(motion, t_end, y, 0.0_wp, keeper%row)
+      call keeper%validity%observe(keeper%row)
+      keeper%kept%message = in_one_line(keeper%validity%warnings())
       call place(keeper%row, keeper%n_rods, keeper%kept%final)
    end subroutine keep_final
+
+   !> A message has no line ends.
+   pure function in_one_line(lines) result(text)
+      character(len=*), intent(in) :: lines
+      character(len=:), allocatable :: text
+      integer :: i
+
+      text = ''
+      do i = 1, len(lines)
+         if (lines(i:i) == new_line('a')) then
+            text = text//'; '
+         else
+            text = text//lines(i:i)
+         end if
+      end do
+   end function in_one_line
 
    !> Status and message of a case that has ended. Nothing that happens to a case is an error of the sweep.
    subroutine conclude_case(sweep, late, error, kept)
@@ -424,6 +455,7 @@ contains
       end if
       if (probe == 0 .and. .not. self%keep_series) return
       call fill_row(motion, t, y, 0.0_wp, self%row)
+      call self%validity%observe(self%row)
       if (probe > 0) call place(self%row, self%n_rods, self%kept%probes(:, probe))
       if (output == 0 .or. .not. self%keep_series) return
       self%kept%times(output) = t
@@ -452,6 +484,18 @@ contains
       state(last + 1:) = [row%velocity_x, row%velocity_y, row%omega, &
                           row%displacement_x, row%displacement_y, row%rotation]
    end subroutine place
+
+   function new_monitor(sweep, pulse, clock_start, late) result(monitor)
+      type(sweep_config), intent(in) :: sweep
+      class(pulse_type), target, intent(inout) :: pulse
+      integer(i8), intent(in) :: clock_start
+      logical, target, intent(inout) :: late
+      type(case_monitor) :: monitor
+      monitor%pulse => pulse
+      monitor%clock_start = clock_start
+      monitor%limit = sweep%case_seconds
+      monitor%late => late
+   end function new_monitor
 
    !> Nothing: the sweep has a progress of its own.
    subroutine report(self, t, n_steps)

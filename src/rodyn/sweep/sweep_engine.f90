@@ -6,10 +6,12 @@ module rodyn_sweep_engine
    use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type, raise, exit_bad_input, exit_done, exit_failed, exit_stopped
-   use rodyn_file_text, only: read_text_file
+   use rodyn_input_texts, only: input_texts, read_input_texts
+   use rodyn_lanes, only: lanes
    use rodyn_lapack, only: use_one_thread
    use rodyn_posix, only: ignore_file_size_signal, path_exists
    use rodyn_posix_files, only: stop_signal, watch_signals, write_text_file
+   use rodyn_run_needs, only: check_memory, memory_of_scene, of_program
    use rodyn_sweep_case, only: allocate_result, case_result, case_shape, new_case_shape, status_done, status_failed, status_stopped
    use rodyn_sweep_config, only: sweep_config
    use rodyn_sweep_directory, only: sweep_directory, result_name
@@ -21,7 +23,7 @@ module rodyn_sweep_engine
    use rodyn_sweep_ranks, only: rank_group, at_done, at_errors, at_failed, at_next, at_stopped
    use rodyn_sweep_reader, only: find_base, parse_sweep
    use rodyn_sweep_result, only: result_is_sound, write_result
-   use rodyn_sweep_worker, only: case_feed, lanes_text, run_cases
+   use rodyn_sweep_worker, only: case_feed, lanes_text, run_cases, uses_lanes
    use rodyn_sweep_writer, only: shard_writer
    use rodyn_text, only: to_text
    implicit none (type, external)
@@ -143,37 +145,59 @@ contains
    subroutine read_input(engine, error)
       type(engine_type), intent(inout) :: engine
       type(error_type), allocatable, intent(out) :: error
-      character(len=:), allocatable :: base_name, base_text, text
+      type(input_texts) :: input
       integer(i8) :: fault
 
-      associate (name => engine%options%file)
-         fault = exit_done
-         if (engine%ranks%rank == 0) then
-            call read_text_file(name, text, error)
-            if (.not. allocated(error)) call find_base(text, name, base_name, error)
-            if (.not. allocated(error)) call read_text_file(base_name, base_text, error)
-            if (.not. allocated(error)) call parse_sweep(text, name, base_text, base_name, .true., engine%sweep, error)
-            if (engine%ranks%launched > 1 .and. engine%ranks%count == 1 .and. .not. allocated(error)) &
-               call raise(error, to_text(engine%ranks%launched)//' processes were started, but MPI connects none of them; '// &
-                          'try srun --mpi=pmix, or --shard', exit_bad_input)
-            if (engine%ranks%count > 1 .and. engine%options%n_shards > 0 .and. .not. allocated(error)) &
-               call raise(error, '--shard is for single processes; ranks of MPI share the cases by themselves', exit_bad_input)
-            if (allocated(error)) fault = error%exit_code
-         end if
-         call engine%ranks%share_word(fault)
-         if (fault /= exit_done) then
-            if (.not. allocated(error)) call raise(error, '', int(fault))
-            return
-         end if
-         call engine%ranks%share_text(text)
-         call engine%ranks%share_text(base_name)
-         call engine%ranks%share_text(base_text)
-         if (engine%ranks%rank > 0) call parse_sweep(text, name, base_text, base_name, .false., engine%sweep, error)
-      end associate
+      fault = exit_done
+      if (engine%ranks%rank == 0) then
+         call read_input_texts(engine%options%file, input, error)
+         if (.not. allocated(error) .and. .not. input%is_sweep) & ! says what is missing
+            call find_base(input%text, input%name, input%base_name, error)
+         if (.not. allocated(error)) call parse(.true.)
+         if (engine%ranks%launched > 1 .and. engine%ranks%count == 1 .and. .not. allocated(error)) &
+            call raise(error, to_text(engine%ranks%launched)//' processes were started, but MPI connects none of them; '// &
+                       'try srun --mpi=pmix, or --shard', exit_bad_input)
+         if (engine%ranks%count > 1 .and. engine%options%n_shards > 0 .and. .not. allocated(error)) &
+            call raise(error, '--shard is for single processes; ranks of MPI share the cases by themselves', exit_bad_input)
+         if (allocated(error)) fault = error%exit_code
+      end if
+      call engine%ranks%share_word(fault)
+      if (fault /= exit_done) then
+         if (.not. allocated(error)) call raise(error, '', int(fault))
+         return
+      end if
+      call engine%ranks%share_text(input%text)
+      call engine%ranks%share_text(input%name)
+      call engine%ranks%share_text(input%base_text)
+      call engine%ranks%share_text(input%base_name)
+      if (engine%ranks%rank > 0) call parse(.false.)
       if (.not. allocated(error)) call new_plan(engine%plan, engine%sweep, error)
       if (allocated(error)) return
       call new_case_shape(engine%shape, engine%sweep)
+      call check_memory('n_rods = '//to_text(engine%shape%n_rods)//', '//to_text(engine%plan%n_cases)//' cases, '// &
+                        to_text(engine%shape%n_rows)//' rows of series', memory_of_sweep(engine), error)
+
+   contains
+
+      subroutine parse(try_values)
+         logical, intent(in) :: try_values
+         call parse_sweep(input%text, input%name, input%base_text, input%base_name, try_values, engine%sweep, error)
+      end subroutine parse
+
    end subroutine read_input
+
+   !> Memory of one process: cases that are under way with their results, and what is known of all [bytes].
+   pure real(wp) function memory_of_sweep(engine)
+      type(engine_type), intent(in) :: engine
+      real(wp), parameter :: word = 8.0_wp, of_any_case = 64.0_wp
+      real(wp) :: numbers, n_states
+
+      n_states = real(engine%shape%n_states, wp)
+      numbers = n_states*(1.0_wp + engine%shape%n_probes + engine%shape%n_rows) + engine%shape%n_rows
+      if (engine%shape%outputs) numbers = numbers + 2.0_wp*engine%sweep%base_case%n_outputs
+      memory_of_sweep = of_program + of_any_case*engine%plan%n_cases + (memory_of_scene(engine%sweep%base_case) + word*numbers)* &
+                        min(merge(lanes, 1, uses_lanes(engine%sweep, engine%plan)), engine%plan%n_cases)
+   end function memory_of_sweep
 
    !> Lock the directory, verify what is in it, and find what is missing.
    subroutine open_sweep(engine, error)

@@ -233,7 +233,7 @@ contains
          end if
       end do
       call make('status', [integer ::], 'text', '', 'done or failed')
-      call make('message', [integer ::], 'text', '', 'why the case failed')
+      call make('message', [integer ::], 'text', '', 'why the case failed, or warnings on its model')
       call make('t_reached', [integer ::], 'real', 's', 'last good time; of a done case its end')
       call make('n_steps', [integer ::], 'integer', '1', 'internal steps')
       call make('n_rhs', [integer ::], 'integer', '1', 'right-hand sides')

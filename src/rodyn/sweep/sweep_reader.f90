@@ -1,6 +1,7 @@
 !> From a sweep file to a `sweep_config`: strict, and with every fault of the file in one error.
 !>
-!>     call read_sweep('cases/table3_sweep.nml', sweep, error)
+!>     call read_input_texts('cases/table3_sweep.nml', input, error)
+!>     call parse_sweep(input%text, input%name, input%base_text, input%base_name, .true., sweep, error)
 !>     call new_plan(plan, sweep, error)
 module rodyn_sweep_reader
    use rodyn_kinds, only: wp
@@ -12,7 +13,6 @@ module rodyn_sweep_reader
    use rodyn_document_checks, only: check_document
    use rodyn_errors, only: error_type
    use rodyn_field_loader, only: field_loader
-   use rodyn_file_text, only: read_text_file
    use rodyn_namelist_document, only: namelist_document, group_count
    use rodyn_namelist_edit, only: split_key
    use rodyn_namelist_parser, only: parse_document
@@ -24,7 +24,7 @@ module rodyn_sweep_reader
    use rodyn_text, only: lower, printable, to_text
    implicit none (type, external)
    private
-   public :: read_sweep, parse_sweep, find_base, is_sweep_text, default_sweep
+   public :: parse_sweep, find_base, is_sweep_text, default_sweep
 
    character(len=*), parameter :: nl = new_line('a')
    character(len=*), parameter :: heading = &
@@ -32,19 +32,6 @@ module rodyn_sweep_reader
       "! `base` is a case file; `rodyn defaults run` prints one."//nl
 
 contains
-
-   !> Read, check and complete a sweep file and its base.
-   subroutine read_sweep(path, sweep, error)
-      character(len=*), intent(in) :: path
-      type(sweep_config), intent(out) :: sweep
-      type(error_type), allocatable, intent(out) :: error !! exit code 2, all faults
-      character(len=:), allocatable :: text, base_text, base_name
-
-      call read_text_file(path, text, error)
-      if (.not. allocated(error)) call find_base(text, path, base_name, error)
-      if (.not. allocated(error)) call read_text_file(base_name, base_text, error)
-      if (.not. allocated(error)) call parse_sweep(text, path, base_text, base_name, .true., sweep, error)
-   end subroutine read_sweep
 
    !> Where the base of a sweep is: its path, from the directory of the sweep file.
    subroutine find_base(text, name, path, error)
@@ -69,13 +56,13 @@ contains
       end if
    end subroutine find_base
 
-   !> The same from texts in memory.
+   !> Check and complete a sweep and its base.
    subroutine parse_sweep(text, name, base_text, base_name, try_values, sweep, error)
       character(len=*), intent(in) :: text, name
       character(len=*), intent(in) :: base_text, base_name
       logical, intent(in) :: try_values !! build a case with each value of each axis
       type(sweep_config), intent(out) :: sweep
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(out) :: error !! exit code 2, all faults
       type(namelist_document), target :: document
       type(checked_document), target :: checked
       type(error_type), allocatable :: base_error
@@ -204,6 +191,7 @@ contains
          end do
          if (.not. all([is_sound(checked, 'axis', i, 'start'), is_sound(checked, 'axis', i, 'stop'), &
                         is_sound(checked, 'axis', i, 'count'), is_sound(checked, 'axis', i, 'spacing')])) return
+         if (n < 1) return ! `count` is missing, which was told above
          if (spacing == 'log' .and. .not. (first > 0.0_wp .and. last > 0.0_wp)) then
             call blame(checked, 'axis', i, 'spacing', 'needs positive start and stop')
          else if (n == 1 .and. abs(last - first) > 0.0_wp) then

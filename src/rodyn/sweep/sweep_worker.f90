@@ -195,9 +195,8 @@ contains
       new%ticket = ticket
       call clear_result(new%kept, self%shape, case)
       new%keeper%kept => new%kept
-      call prepare_case(self%sweep, self%plan, self%shape, case, new%motion, new%y, new%times, new%t_end, new%keeper, &
-                        new%choice, error)
-      late = .false.
+      call prepare_case(self%sweep, self%plan, self%shape, case, self%feed, clock_start, new%motion, new%y, new%times, &
+                        new%t_end, new%keeper, new%choice, late, error)
       if (.not. allocated(error) .and. self%sweep%integrate) then
          new%options = new%choice%options
          new%limit = self%sweep%case_seconds

@@ -1,0 +1,121 @@
+"""Break it from outside: kill -9, SIGTERM and full disks at random instants of single runs.
+
+    python bench/stability/faults.py [PROGRAM] [--trials 100]
+
+Whatever happens, no file may look complete and be none: FILE.h5 is there only with all rows and status 'done' (and then is the
+same as that of an undisturbed run), FILE.h5.stopped only after SIGTERM, with a readable beginning of the same rows.
+"""
+
+from __future__ import annotations
+
+import argparse
+import pathlib
+import random
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+import h5py
+import numpy as np
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
+import program  # noqa: E402
+from run_files import OF_THE_HOUR, differences  # noqa: E402
+from scenes import CHAIN, MOMENT, SPACECRAFT  # noqa: E402
+
+#: About a third of a second, a megabyte in several blocks.
+CASE = ("&case title = 'Disturbed', t_end = 3, n_outputs = 6000 /\n" + SPACECRAFT + CHAIN + MOMENT
+        + "&solver method = 'dop853', rtol = 1e-10, atol = 1e-12 /\n")
+
+
+class Trials:
+    """An undisturbed run, and disturbed ones beside it."""
+
+    def __init__(self, rodyn: str, directory: pathlib.Path, text: str = CASE):
+        self.rodyn, self.directory = rodyn, directory
+        (directory / "case.nml").write_text(text)
+        self.whole = directory / "whole.h5"
+        start = time.time()
+        subprocess.run([rodyn, "run", "case.nml", "--output", "whole.h5", "--quiet"], cwd=directory, check=True)
+        self.seconds = time.time() - start
+
+    def start(self, **options) -> subprocess.Popen:
+        return subprocess.Popen([self.rodyn, "run", "case.nml", "--output", "out.h5", "--quiet"], cwd=self.directory,
+                                stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
+
+    def signalled(self, number: int, delay: float) -> str:
+        """What is wrong after a signal; empty if nothing."""
+        process = self.start()
+        time.sleep(delay)
+        process.send_signal(number)
+        _, said = process.communicate()
+        allowed = {0, -9} if number == signal.SIGKILL else {0, 75, -15}  # before the program looks out for it, SIGTERM kills
+        return self.verdict(process.returncode, said, allowed)
+
+    def full(self, limit: int) -> str:
+        """What is wrong after a run that may write so many bytes."""
+        def apply() -> None:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+            resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        process = self.start(preexec_fn=apply)
+        _, said = process.communicate()
+        return self.verdict(process.returncode, said, {0, 1})
+
+    def verdict(self, code: int, said: str, allowed: set[int]) -> str:
+        left = {p.name for p in self.directory.iterdir()} - {"case.nml", "whole.h5"}
+        wrong = ""
+        if code not in allowed or program.CRASH.search(said):
+            wrong = f"exit code {code}: {said}"
+        elif code != 0 and "out.h5" in left and differences(self.whole, self.directory / "out.h5") - OF_THE_HOUR:
+            wrong = f"a result that is not complete, exit code {code}"
+        elif code == 0 and (left != {"out.h5"} or differences(self.whole, self.directory / "out.h5") - OF_THE_HOUR):
+            wrong = f"not the result of an undisturbed run; files {left}"
+        elif code == 1 and left:
+            wrong = f"failed to write, and left {left}"
+        elif code == 75:
+            wrong = self.stopped(left)
+        elif code < 0 and any(not name.startswith("out.h5.partial-") for name in left - {"out.h5"}):
+            wrong = f"killed, and left {left}"
+        for name in left:
+            (self.directory / name).unlink()
+        return wrong
+
+    def stopped(self, left: set[str]) -> str:
+        if left != {"out.h5.stopped"}:
+            return f"stopped, and left {left}"
+        with h5py.File(self.directory / "out.h5.stopped") as part, h5py.File(self.whole) as whole:
+            n = part["time"].size
+            if part.attrs["status"] != b"stopped" or n >= whole["time"].size:
+                return f"stopped with status {part.attrs['status']} and {n} rows"
+            if any(not np.array_equal(part[name][()], whole[name][:n]) for name in ("time", "phi", "alpha_rate", "energy_residual")):
+                return "stopped with other rows"
+        return ""
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("program", nargs="?", default=program.RODYN)
+    parser.add_argument("--trials", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=1)
+    options = parser.parse_args()
+    rng = random.Random(options.seed)
+    bad = 0
+    with tempfile.TemporaryDirectory() as place:
+        trials = Trials(str(pathlib.Path(options.program).resolve()), pathlib.Path(place))
+        size = trials.whole.stat().st_size
+        print(f"undisturbed: {trials.seconds:.2f} s, {size} bytes")
+        for name, number in (("kill -9", signal.SIGKILL), ("SIGTERM", signal.SIGTERM)):
+            wrong = [w for _ in range(options.trials) if (w := trials.signalled(number, rng.uniform(0, 1.1 * trials.seconds)))]
+            bad += len(wrong)
+            print(f"{name:10s} {options.trials} times: {len(wrong)} faults", *wrong, sep="\n   ")
+        wrong = [w for _ in range(options.trials) if (w := trials.full(rng.randrange(1, int(1.05 * size))))]
+        bad += len(wrong)
+        print(f"full disk  {options.trials} times: {len(wrong)} faults", *wrong, sep="\n   ")
+    return int(bad > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,99 @@
+!> What the machine has left: memory for this process, space on the disk of a directory (Linux). A run that cannot fit is
+!> refused with a message, rather than end in an allocation that fails or in the system's memory killer.
+module rodyn_resources
+   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_int64_t, c_null_char
+   use rodyn_kinds, only: wp
+   implicit none (type, external)
+   private
+   public :: free_memory, free_disk, gigabytes
+
+   integer(c_int), parameter :: rlimit_as = 9     ! <sys/resource.h>, Linux
+   real(wp), parameter :: unknown = 1.0e300_wp
+
+   interface
+      function posix_getrlimit(resource, limits) result(status) bind(c, name='getrlimit')
+         import :: c_int, c_int64_t
+         implicit none (type, external)
+         integer(c_int), intent(in), value :: resource
+         integer(c_int64_t), intent(out) :: limits(2) !! soft, hard; -1: none
+         integer(c_int) :: status
+      end function posix_getrlimit
+
+      ! struct statvfs has 11 words and 6 spare integers on 64-bit Linux
+      function posix_statvfs(path, words) result(status) bind(c, name='statvfs')
+         import :: c_char, c_int, c_int64_t
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_int64_t), intent(out) :: words(32)
+         integer(c_int) :: status
+      end function posix_statvfs
+   end interface
+
+contains
+
+   !> Memory that can be had without pushing anything out; huge if the system does not tell [bytes].
+   real(wp) function free_memory()
+      integer(c_int64_t) :: limits(2)
+      real(wp) :: group, used
+
+      free_memory = 1024.0_wp*number_in('/proc/meminfo', 'MemAvailable:')
+      group = number_in('/sys/fs/cgroup/memory.max', '')
+      if (group < unknown) then
+         used = number_in('/sys/fs/cgroup/memory.current', '')
+         if (used < group) free_memory = min(free_memory, group - used)
+      end if
+      if (posix_getrlimit(rlimit_as, limits) /= 0) return
+      if (limits(1) >= 0) free_memory = min(free_memory, max(0.0_wp, real(limits(1), wp) - address_space()))
+   end function free_memory
+
+   !> What this process has of its address space already [bytes].
+   real(wp) function address_space()
+      address_space = 1024.0_wp*number_in('/proc/self/status', 'VmSize:')
+      if (address_space > unknown) address_space = 0.0_wp
+   end function address_space
+
+   !> Space for the files of users; huge if the system does not tell [bytes].
+   real(wp) function free_disk(directory)
+      character(len=*), intent(in) :: directory
+      integer(c_int64_t) :: words(32)
+      integer, parameter :: fragment_size = 2, fragments_left = 5
+
+      free_disk = unknown
+      if (posix_statvfs(directory//c_null_char, words) /= 0) return
+      free_disk = real(words(fragment_size), wp)*real(words(fragments_left), wp)
+   end function free_disk
+
+   !> The number behind a word at the beginning of a line; huge if there is none.
+   real(wp) function number_in(path, word)
+      character(len=*), intent(in) :: path, word
+      character(len=200) :: line
+      integer :: stat, unit
+
+      number_in = unknown
+      open (newunit=unit, file=path, status='old', action='read', iostat=stat)
+      if (stat /= 0) return
+      do
+         read (unit, '(a)', iostat=stat) line
+         if (stat /= 0) exit
+         if (index(line, word) /= 1) cycle
+         read (line(len(word) + 1:), *, iostat=stat) number_in
+         if (stat /= 0) number_in = unknown
+         exit
+      end do
+      close (unit)
+   end function number_in
+
+   !> '1.5 GB'
+   pure function gigabytes(bytes) result(text)
+      real(wp), intent(in) :: bytes
+      character(len=:), allocatable :: text
+      character(len=32) :: digits
+      if (bytes < 1.0e12_wp) then
+         write (digits, '(f12.1)') 1.0e-9_wp*bytes
+      else
+         write (digits, '(es9.1)') 1.0e-9_wp*bytes
+      end if
+      text = trim(adjustl(digits))//' GB'
+   end function gigabytes
+
+end module rodyn_resources

@@ -1,0 +1,82 @@
+!> What a run needs of the machine, estimated before it begins: one that cannot fit is refused in words.
+module rodyn_run_needs
+   use rodyn_kinds, only: wp
+   use rodyn_case_config, only: case_config
+   use rodyn_errors, only: error_type, raise, exit_bad_input
+   use rodyn_posix, only: parent_directory
+   use rodyn_resources, only: free_disk, free_memory, gigabytes
+   use rodyn_text, only: to_text
+   implicit none (type, external)
+   private
+   public :: check_needs, check_memory, memory_of_scene, of_program
+
+   real(wp), parameter :: word = 8.0_wp                !! of a real number [bytes]
+   real(wp), parameter :: matrices = 4.75_wp           !! n_dof x n_dof, of the assembled kernel
+   real(wp), parameter :: of_program = 1.0e8_wp        !! whatever the scene; without its 32 MB OpenBLAS would wait for them for ever [bytes]
+   real(wp), parameter :: least_compressed = 0.7_wp    !! of the size of states that move
+
+contains
+
+   !> Refuse a run that needs more memory or disk than there is. The estimates are low rather than high: a run that is let
+   !> through may still end for want of disk, with a message of its own.
+   subroutine check_needs(config, path, error)
+      type(case_config), intent(in) :: config
+      character(len=*), intent(in) :: path !! of the result
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: memory, disk, rows
+
+      rows = real(config%n_outputs, wp) + 1.0_wp
+      memory = of_program + memory_of_scene(config) + 2.0_wp*word*rows ! the output times, while they are made twice
+      call check_memory('n_rods = '//to_text(config%chain%n_rods)//", kernel = '"//trim(config%model%kernel)// &
+                        "', n_outputs = "//to_text(config%n_outputs), memory, error)
+      if (allocated(error)) return
+      disk = word*rows*states_that_move(config)
+      if (config%output%compression > 0) disk = disk*least_compressed
+      if (disk > free_disk(parent_directory(path))) &
+         call raise(error, path//': n_outputs = '//to_text(config%n_outputs)//' rows of '//to_text(config%chain%n_rods)// &
+                    ' rods: needs about '//gigabytes(disk)//' of disk, but only '// &
+                    gigabytes(free_disk(parent_directory(path)))//' are free', exit_bad_input)
+   end subroutine check_needs
+
+   !> Refuse what needs more memory than there is.
+   subroutine check_memory(what, needed, error)
+      character(len=*), intent(in) :: what
+      real(wp), intent(in) :: needed !! [bytes]
+      type(error_type), allocatable, intent(out) :: error
+      if (needed > free_memory()) call raise(error, what//': needs about '//gigabytes(needed)//' of memory, but only '// &
+                                             gigabytes(free_memory())//' are free', exit_bad_input)
+   end subroutine check_memory
+
+   !> Memory of a scene, its integrator and one row of results [bytes]; measured, see docs/stability_input.md.
+   pure real(wp) function memory_of_scene(config)
+      type(case_config), intent(in) :: config
+      real(wp) :: n, n_dof
+
+      n = real(config%chain%n_rods, wp)
+      n_dof = n*merge(3.0_wp, 1.0_wp, config%model%bending == 'dynamic')
+      memory_of_scene = n*bytes_per_rod(config)
+      if (config%model%kernel == 'assembled') memory_of_scene = memory_of_scene + word*matrices*n_dof**2
+   end function memory_of_scene
+
+   !> What grows with n, by method, of 20,000 and 100,000 rods; `auto` is taken for the least of those it may choose.
+   pure real(wp) function bytes_per_rod(config)
+      type(case_config), intent(in) :: config
+      select case (config%solver%method)
+      case ('gauss')
+         bytes_per_rod = 4000.0_wp
+      case ('bdf')
+         bytes_per_rod = 1900.0_wp
+      case default
+         bytes_per_rod = 1500.0_wp
+      end select
+      if (config%model%bending /= 'dynamic') bytes_per_rod = 0.4_wp*bytes_per_rod
+   end function bytes_per_rod
+
+   !> Numbers of a row that change with time and so hardly compress.
+   pure real(wp) function states_that_move(config)
+      type(case_config), intent(in) :: config
+      states_that_move = 1.0_wp + merge(2.0_wp, 6.0_wp, config%model%bending == 'rigid')*config%chain%n_rods
+      if (config%spacecraft%motion == 'free') states_that_move = states_that_move + 6.0_wp
+   end function states_that_move
+
+end module rodyn_run_needs

@@ -1,0 +1,376 @@
+!> Tests of the stability limits of explicit methods.
+module test_step_limit
+   use rodyn_kinds, only: wp
+   use rodyn_errors, only: error_type, exit_bad_input
+   use rodyn_ode, only: ode_system
+   use rodyn_case_config, only: case_config
+   use rodyn_scene, only: scene_type, new_scene
+   use rodyn_motion, only: motion_type, new_motion, initial_state, state_invariants
+   use rodyn_kinematics, only: invariants_type
+   use rodyn_frequencies, only: decay_rates, natural_frequencies
+   use rodyn_fast_eigenvalues, only: extreme_eigenvalues, all_eigenvalues
+   use rodyn_integrator, only: integrator_type, solver_options
+   use rodyn_integrators, only: new_integrator
+   use rodyn_stability_function, only: stability_function, stability_function_of
+   use rodyn_step_limit, only: check_fixed_step, growth_in_run, largest_stable_step
+   use test_random_scenes, only: random_case, seed_random, n_kinds, kind_name
+   use test_testing, only: unittest, new_test, check, check_close
+   implicit none (type, external)
+   private
+   public :: collect_step_limit
+
+   !> x'' = -w^2 x - d x'.
+   type, extends(ode_system) :: oscillator
+      real(wp) :: frequency = 1.0_wp !! w [rad/s]
+      real(wp) :: damping = 0.0_wp   !! d [1/s]
+   contains
+      procedure :: rhs
+      procedure :: jacobian
+   end type oscillator
+
+   !> The explicit methods, by name and order.
+   character(len=6), parameter :: methods(8) = [character(len=6) :: 'erk', 'erk', 'erk', 'erk', 'erk', 'erk', 'erk', 'dop853']
+   integer, parameter :: orders(8) = [2, 3, 4, 5, 6, 7, 8, 8]
+   integer, parameter :: n_steps = 20000
+
+contains
+
+   subroutine collect_step_limit(suite)
+      type(unittest), allocatable, intent(out) :: suite(:)
+      suite = [ &
+         new_test('stability functions begin with the exponential series, to the order and no further', exponential_series), &
+         new_test('known limits: Heun 0, cubic sqrt 3, quartic sqrt 8, on the real axis 2, 2.5127, 2.7853', known_limits), &
+         new_test('an oscillator stays below the limit of each method and grows above it', oscillator_limits), &
+         new_test('an overdamped oscillator decays below the limit of each method and grows above it', damper_limits), &
+         new_test('eigenvalues of random scenes at rest are their natural frequencies', undamped_eigenvalues), &
+         new_test('the fastest vibration and damper of a long chain, from below and to a hundredth', extreme_rates), &
+         new_test('a scene keeps its energy below the limit of each method and explodes above it', scene_limits), &
+         new_test('a refused step is named with a limit that is accepted', refusals)]
+   end subroutine collect_step_limit
+
+   subroutine rhs(self, t, y, ydot, ok)
+      class(oscillator), intent(inout) :: self
+      real(wp), intent(in) :: t
+      real(wp), contiguous, intent(in) :: y(:)
+      real(wp), contiguous, intent(out) :: ydot(:)
+      logical, intent(out) :: ok
+      ok = t < huge(t) .and. all(abs(y) < 1.0e100_wp)
+      ydot = 0.0_wp
+      if (.not. ok) return
+      ydot(1) = y(2)
+      ydot(2) = -self%frequency**2*y(1) - self%damping*y(2)
+   end subroutine rhs
+
+   subroutine jacobian(self, t, y, jac, ok)
+      class(oscillator), intent(inout) :: self
+      real(wp), intent(in) :: t
+      real(wp), contiguous, intent(in) :: y(:)
+      real(wp), contiguous, intent(out) :: jac(:, :)
+      logical, intent(out) :: ok
+      ok = t < huge(t)
+      jac(:, 1) = [0.0_wp, -self%frequency**2]
+      jac(:, 2) = [1.0_wp, -self%damping] + 0.0_wp*y
+   end subroutine jacobian
+
+   subroutine exponential_series(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(stability_function) :: r
+      real(wp) :: factorial
+      integer :: i, k
+
+      do i = 1, size(methods)
+         call stability_function_of(r, trim(methods(i)), orders(i), error)
+         if (allocated(error)) return
+         factorial = 1.0_wp
+         do k = 1, orders(i)
+            factorial = factorial*k
+            call check_close(error, r%coefficient(k)*factorial, 1.0_wp, 1.0e-12_wp, 'coefficient within the order')
+            if (allocated(error)) return
+         end do
+         k = orders(i) + 1
+         if (ubound(r%coefficient, 1) < k) cycle
+         call check(error, abs(r%coefficient(k)*factorial*k - 1.0_wp) > 1.0e-3_wp, 'coefficient beyond the order')
+         if (allocated(error)) return
+      end do
+      call stability_function_of(r, 'gauss', 0, error)
+      if (.not. allocated(error)) call check(error, .not. allocated(r%coefficient), 'an implicit method has a limit')
+   end subroutine exponential_series
+
+   !> Textbook values of the polynomials of degree 2, 3 and 4 that are the exponential series.
+   subroutine known_limits(error)
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), parameter :: imaginary(2:4) = [0.0_wp, sqrt(3.0_wp), sqrt(8.0_wp)], real_axis(2:4) = [2.0_wp, 2.5127_wp, 2.7853_wp]
+      real(wp), parameter :: near = 1.0e-3_wp
+      type(stability_function) :: r
+      integer :: order
+
+      do order = 2, 4
+         call stability_function_of(r, 'erk', order, error)
+         if (allocated(error)) return
+         if (order > 2) call check(error, r%growth(cmplx(0.0_wp, imaginary(order) - near, wp)) < 0.0_wp, 'imaginary axis, below')
+         if (allocated(error)) return
+         call check(error, r%growth(cmplx(0.0_wp, imaginary(order) + near, wp)) > 0.0_wp, 'imaginary axis, above')
+         if (allocated(error)) return
+         call check(error, r%growth(cmplx(near - real_axis(order), 0.0_wp, wp)) < 0.0_wp, 'real axis, below')
+         if (allocated(error)) return
+         call check(error, r%growth(cmplx(-near - real_axis(order), 0.0_wp, wp)) > 0.0_wp, 'real axis, above')
+         if (allocated(error)) return
+      end do
+   end subroutine known_limits
+
+   subroutine oscillator_limits(error)
+      type(error_type), allocatable, intent(out) :: error
+      call step_across_limit(100.0_wp, 0.0_wp, error)
+   end subroutine oscillator_limits
+
+   subroutine damper_limits(error)
+      type(error_type), allocatable, intent(out) :: error
+      call step_across_limit(10.0_wp, 1000.0_wp, error)
+   end subroutine damper_limits
+
+   !> Step an oscillator with 0.98 and 1.05 of the limit that is found from 10/w.
+   subroutine step_across_limit(frequency, damping, error)
+      real(wp), intent(in) :: frequency, damping
+      type(error_type), allocatable, intent(out) :: error
+      type(stability_function) :: r
+      complex(wp) :: lambda(1, 1)
+      real(wp) :: limit, t_end
+      integer :: i
+
+      lambda(1, 1) = -0.5_wp*damping - sqrt(cmplx(0.25_wp*damping**2 - frequency**2, 0.0_wp, wp))
+      do i = 1, size(methods)
+         call stability_function_of(r, trim(methods(i)), orders(i), error)
+         if (allocated(error)) return
+         t_end = n_steps/abs(lambda(1, 1))
+         limit = largest_stable_step(r, lambda, 20.0_wp/abs(lambda(1, 1)), t_end)
+         call check(error, final_size(i, 0.98_wp*limit) < 1000.0_wp, trim(methods(i))//' grows below its limit')
+         if (allocated(error)) return
+         call check(error, final_size(i, 1.05_wp*limit) > 1000.0_wp, trim(methods(i))//' stays above its limit')
+         if (allocated(error)) return
+      end do
+
+   contains
+
+      !> Size of the state at t_end, 1 at the start; huge if the run failed.
+      real(wp) function final_size(which, step)
+         integer, intent(in) :: which
+         real(wp), intent(in) :: step
+         type(oscillator), target :: system
+         type(solver_options) :: options
+         class(integrator_type), allocatable :: integrator
+         type(error_type), allocatable :: failure
+         real(wp) :: y(2), t
+
+         system%frequency = frequency
+         system%damping = damping
+         system%n_states = 2
+         system%n_controlled = 2
+         options%order = orders(which)
+         options%fixed_step = step
+         y = [1.0_wp, 0.0_wp]
+         call new_integrator(integrator, system, trim(methods(which)), options, failure)
+         if (.not. allocated(failure)) call integrator%set_stop(t_end)
+         if (.not. allocated(failure)) call integrator%start(0.0_wp, y, failure)
+         if (.not. allocated(failure)) call integrator%advance(t_end, y, t, failure)
+         final_size = huge(1.0_wp)
+         if (.not. allocated(failure)) final_size = norm2([y(1), y(2)/frequency])
+         call integrator%finalize()
+      end function final_size
+
+   end subroutine step_across_limit
+
+   !> Without dampers, loads and turning, lambda = +- i w.
+   subroutine undamped_eigenvalues(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+      type(scene_type) :: scene
+      complex(wp), allocatable :: lambda(:, :)
+      real(wp), allocatable :: frequency(:), y(:)
+      integer :: which, i
+
+      call seed_random(41)
+      do which = 1, n_kinds
+         call random_case(config, which, 3)
+         if (config%model%dampers == 'exact') cycle
+         config%chain%hinge_damping = 0.0_wp
+         config%chain%kink = config%initial%phi - eoshift(config%initial%phi, -1) ! no moments, so no acceleration
+         config%loads = config%loads(:0)
+         call new_scene(scene, config, error)
+         if (allocated(error)) return
+         allocate (y(2*scene%n_dof), source=0.0_wp)
+         y(scene%phi_at() + 1:scene%phi_at() + 3) = config%initial%phi
+         call natural_frequencies(scene, y(:scene%n_dof), frequency, error)
+         if (allocated(error)) return
+         call all_eigenvalues(scene, y, lambda)
+         call check(error, size(lambda), 2*scene%n_dof, 'eigenvalues found')
+         if (allocated(error)) return
+         do i = 1, size(frequency)
+            call check_close(error, minval(abs(lambda - cmplx(0.0_wp, frequency(i), wp)))/maxval(frequency), 0.0_wp, &
+                             1.0e-6_wp, kind_name(which))
+            if (allocated(error)) return
+         end do
+         deallocate (y)
+      end do
+   end subroutine undamped_eigenvalues
+
+   subroutine extreme_rates(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+      type(scene_type) :: scene
+      complex(wp), allocatable :: lambda(:, :)
+      real(wp), allocatable :: frequency(:), decay(:), q(:)
+      integer :: which
+
+      call seed_random(42)
+      do which = 1, n_kinds
+         call random_case(config, which, 40)
+         call new_scene(scene, config, error)
+         if (allocated(error)) return
+         if (scene%n_q > scene%n_dof) cycle
+         allocate (q(scene%n_q), source=0.0_wp)
+         q(scene%phi_at() + 1:scene%phi_at() + scene%n) = config%initial%phi
+         call natural_frequencies(scene, q, frequency, error)
+         if (allocated(error)) return
+         call extreme_eigenvalues(scene, q, lambda)
+         call check_from_below(abs(lambda(1, 1)), maxval(frequency), kind_name(which)//': frequency')
+         if (allocated(error)) return
+         if (scene%hinges%has_damping) then
+            call decay_rates(scene, q, decay, error)
+            if (allocated(error)) return
+            call check_from_below(abs(lambda(1, 2)), maxval(decay), kind_name(which)//': decay')
+            if (allocated(error)) return
+         end if
+         deallocate (q)
+      end do
+
+   contains
+
+      subroutine check_from_below(found, largest, what)
+         real(wp), intent(in) :: found, largest
+         character(len=*), intent(in) :: what
+         call check(error, found <= largest*(1.0_wp + 1.0e-3_wp), what//' above the highest')
+         if (.not. allocated(error)) call check(error, found >= 0.99_wp*largest, what//' not near the highest')
+      end subroutine check_from_below
+
+   end subroutine extreme_rates
+
+   !> Two rods that swing a little, for 300 periods of their fastest vibration: largest energy over that at the start.
+   subroutine scene_limits(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+      type(scene_type) :: scene
+      type(stability_function) :: r
+      complex(wp), allocatable :: lambda(:, :)
+      real(wp), allocatable :: y(:)
+      type(motion_type) :: motion
+      real(wp) :: limit, t_end
+      integer :: i
+
+      call seed_random(43)
+      call random_case(config, 1, 2)
+      config%chain%hinge_damping = 0.0_wp
+      config%chain%kink = 0.0_wp
+      config%loads = config%loads(:0)
+      config%initial%alpha = 0.0_wp
+      config%initial%beta = 0.0_wp
+      call new_scene(scene, config, error)
+      if (.not. allocated(error)) call new_motion(motion, scene, .false., error)
+      if (allocated(error)) return
+      call initial_state(motion, config%initial, y)
+      y(:motion%n_q) = 0.0_wp
+      y = 1.0e-6_wp*y
+      call all_eigenvalues(scene, y, lambda)
+      t_end = 2000.0_wp/maxval(abs(lambda))
+      do i = 1, size(methods)
+         call stability_function_of(r, trim(methods(i)), orders(i), error)
+         if (allocated(error)) return
+         limit = largest_stable_step(r, lambda, 20.0_wp/maxval(abs(lambda)), t_end)
+         call check(error, energy_ratio(i, 0.9_wp*limit) < 1.0e6_wp, trim(methods(i))//': explodes below its limit')
+         if (allocated(error)) return
+         call check(error, energy_ratio(i, 1.5_wp*limit) > 1.0e6_wp, trim(methods(i))//': stays above its limit')
+         if (allocated(error)) return
+      end do
+
+   contains
+
+      real(wp) function energy_ratio(which, step)
+         integer, intent(in) :: which
+         real(wp), intent(in) :: step
+         type(motion_type), target :: fresh
+         type(solver_options) :: options
+         class(integrator_type), allocatable :: integrator
+         type(error_type), allocatable :: failure
+         type(invariants_type) :: first, last
+         integer, parameter :: n_looks = 400
+         real(wp) :: state(size(y)), t
+         integer :: j
+
+         options%order = orders(which)
+         options%fixed_step = step
+         call new_motion(fresh, scene, .false., failure)
+         call fresh%dynamics%set_regime(0.0_wp, t_end)
+         call new_integrator(integrator, fresh, trim(methods(which)), options, failure)
+         if (.not. allocated(failure)) call integrator%set_stop(t_end)
+         if (.not. allocated(failure)) call integrator%start(0.0_wp, y, failure)
+         first = state_invariants(fresh, y)
+         energy_ratio = 1.0_wp
+         do j = 1, n_looks
+            if (.not. allocated(failure)) call integrator%advance(t_end*(real(j, wp)/n_looks), state, t, failure)
+            if (allocated(failure)) exit
+            last = state_invariants(fresh, state)
+            energy_ratio = (last%kinetic + last%elastic)/(first%kinetic + first%elastic)
+            if (energy_ratio > 1.0e6_wp) exit
+         end do
+         call integrator%finalize()
+      end function energy_ratio
+
+   end subroutine scene_limits
+
+   !> Take the number behind 'steps above'.
+   subroutine refusals(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+      type(scene_type) :: scene
+      type(motion_type) :: motion
+      type(solver_options) :: options
+      type(error_type), allocatable :: refusal
+      real(wp), allocatable :: y(:)
+      character(len=*), parameter :: words = 'with steps above '
+      integer :: i, n, at, n_rods
+
+      call seed_random(44)
+      do n = 1, 2
+         n_rods = merge(3, 40, n == 1)
+         call random_case(config, 1, n_rods)
+         call new_scene(scene, config, error)
+         if (.not. allocated(error)) call new_motion(motion, scene, .false., error)
+         if (allocated(error)) return
+         call initial_state(motion, config%initial, y)
+         do i = 1, size(methods)
+            options = solver_options(order=orders(i), fixed_step=0.1_wp)
+            call check_fixed_step(trim(methods(i)), options, scene, y, 10.0_wp, refusal)
+            call check(error, allocated(refusal), 'not refused')
+            if (allocated(error)) return
+            call check(error, refusal%exit_code, exit_bad_input, 'exit code')
+            if (allocated(error)) return
+            at = index(refusal%message, words)
+            call check(error, at > 0, 'no limit in: '//refusal%message)
+            if (allocated(error)) return
+            read (refusal%message(at + len(words):), *) options%fixed_step
+            call check_fixed_step(trim(methods(i)), options, scene, y, 10.0_wp, refusal)
+            call check(error, .not. allocated(refusal), 'the limit itself is refused')
+            if (allocated(error)) return
+            options%fixed_step = 0.1_wp
+            options%allow_unstable = .true.
+            call check_fixed_step(trim(methods(i)), options, scene, y, 10.0_wp, refusal)
+            call check(error, .not. allocated(refusal), 'refused although allowed')
+            if (allocated(error)) return
+         end do
+         options = solver_options(fixed_step=0.1_wp)
+         call check_fixed_step('gauss', options, scene, y, 10.0_wp, refusal)
+         call check(error, .not. allocated(refusal), 'gauss refused')
+         if (allocated(error)) return
+      end do
+   end subroutine refusals
+
+end module test_step_limit
