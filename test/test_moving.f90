@@ -728,6 +728,8 @@ contains
       config%initial%beta = 0.0_wp
       config%initial%alpha_rate = 0.0_wp
       config%initial%beta_rate = 0.0_wp
+      config%initial%bubble = 0.0_wp
+      config%initial%bubble_rate = 0.0_wp
       hinge%hinge = 1
       hinge%held = .true.
       hinge%release_time = 0.4_wp

@@ -248,7 +248,7 @@ contains
       subroutine check_from_below(found, largest, what)
          real(wp), intent(in) :: found, largest
          character(len=*), intent(in) :: what
-         call check(error, found <= largest*(1.0_wp + 1.0e-3_wp), what//' above the highest')
+         call check(error, found <= largest*(1.0_wp + 1.0e-6_wp), what//' above the highest')
          if (.not. allocated(error)) call check(error, found >= 0.99_wp*largest, what//' not near the highest')
       end subroutine check_from_below
 

@@ -12,7 +12,8 @@ module rodyn_run_needs
 
    real(wp), parameter :: word = 8.0_wp                !! of a real number [bytes]
    real(wp), parameter :: matrices = 4.75_wp           !! n_dof x n_dof, of the assembled kernel
-   real(wp), parameter :: of_program = 1.0e8_wp        !! whatever the scene; without its 32 MB OpenBLAS would wait for them for ever [bytes]
+   !> Whatever the scene; without its 32 MB OpenBLAS would wait for them for ever [bytes].
+   real(wp), parameter :: of_program = 1.0e8_wp
    real(wp), parameter :: least_compressed = 0.7_wp    !! of the size of states that move
 
 contains
