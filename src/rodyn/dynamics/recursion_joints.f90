@@ -87,6 +87,11 @@ contains
             else
                call release(moment(k - 1), pass, inertia, bias, smallest)
             end if
+            if (.not. smallest > 0.0_wp) then ! the state of a step that was much too long: nothing to divide by
+               acceleration = 0.0_wp
+               ok = .false.
+               return
+            end if
             pass%cd = cosine(k)*cosine(k - 1) + sine(k)*sine(k - 1)
             pass%sd = sine(k)*cosine(k - 1) - cosine(k)*sine(k - 1)
             call turn_inward(pass%cd, pass%sd, inertia, bias)
@@ -182,8 +187,11 @@ contains
       integer :: i, j, m, last
 
       last = 3 + nb
+      inertia = 0.0_wp
+      bias = 0.0_wp
       do i = last, 4, -1
          smallest = min(smallest, h(i, i))
+         if (.not. h(i, i) > 0.0_wp) return
          factor = 1.0_wp/h(i, i)
          h(i, :i - 1) = h(i, :i - 1)*factor
          c(i) = c(i)*factor
@@ -215,6 +223,7 @@ contains
       integer :: j
 
       smallest = min(smallest, inertia(3, 3))
+      if (.not. inertia(3, 3) > 0.0_wp) return
       pass%t(1:2) = inertia(1:2, 3)/inertia(3, 3)
       pass%t0 = -(bias(3) + moment)/inertia(3, 3)
       bias(1:2) = bias(1:2) + inertia(1:2, 3)*pass%t0
