@@ -157,9 +157,10 @@ contains
       if (allocated(error)) return
       if (input%is_sweep) then
          call parse_sweep(input%text, input%name, input%base_text, input%base_name, .true., sweep, error)
-      else
+         if (.not. allocated(error)) call new_scene(scene, sweep%base_case, error)
+      else ! numbers may be finite, and what follows from them not
          call parse_case(input%text, input%name, config, error)
-         if (.not. allocated(error)) call new_scene(scene, config, error) ! numbers that are finite, but not what follows from them
+         if (.not. allocated(error)) call new_scene(scene, config, error)
          if (.not. allocated(error)) call refuse_steps(options, config, error)
       end if
       if (.not. allocated(error) .and. .not. options%quiet) call print_text(options%file//': valid', error)
