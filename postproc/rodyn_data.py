@@ -280,7 +280,8 @@ class Modes(Run):
 
     def shape(self, i: int) -> dict[str, np.ndarray]:
         """Changes of the coordinates in mode i."""
-        return {name: self.file[f"{name}_real"][i] + 1j * self.file[f"{name}_imag"][i] for name in RATE_OF}
+        return {name: self.file[f"{name}_real"][i] + 1j * self.file[f"{name}_imag"][i]
+                for name in RATE_OF if f"{name}_real" in self.file}  # bubbles are there with three shapes
 
     def state(self) -> dict[str, np.ndarray]:
         """The coordinates about which the equations were linearised; slopes that follow from moments are left out."""

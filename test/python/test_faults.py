@@ -54,7 +54,7 @@ def place(tmp_path):
 def test_damaged_namelists_neither_crash_nor_hang_nor_slip_through(tmp_path):
     told = []
     outcomes = fuzz.campaign(5, list(range(300)), 2, tmp_path, reduce=False, tell=told.append)
-    assert told == []
+    assert all(" 0 faults" in line for line in told), told
     ends = {end for outcome in outcomes for end in outcome.ends}
     assert {"check 0", "check 2", "run 0", "sweep 0"} <= ends  # neither all refused nor all accepted
 
