@@ -13,7 +13,7 @@ module rodyn_lanes_bench
    use rodyn_ensemble, only: ensemble_client, ensemble_member, run_ensemble
    use rodyn_integrator, only: integrator_type, solver_options
    use rodyn_integrators, only: new_integrator
-   use rodyn_simulation, only: observer_type, simulate
+   use rodyn_simulation, only: observer_type, listed_times, simulate
    implicit none (type, external)
    private
    public :: kernels, cases
@@ -144,7 +144,7 @@ contains
          if (.not. allocated(error)) call new_integrator(integrator, motion, method, options, error)
          if (allocated(error)) error stop error%message
          allocate (y(motion%n_states), source=0.0_wp)
-         call simulate(motion, integrator, [1.0_wp], 1.0_wp, observer, y, t, error)
+         call simulate(motion, integrator, listed_times([1.0_wp]), 1.0_wp, observer, y, t, error)
          if (allocated(error)) error stop error%message
          phi(i) = y(7)
          associate (counts => integrator%statistics())

@@ -84,7 +84,7 @@ program bench_work_precision
    use rodyn_motion, only: motion_type, new_motion, initial_state
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics
    use rodyn_integrators, only: new_integrator, integrator_names
-   use rodyn_simulation, only: simulate
+   use rodyn_simulation, only: listed_times, simulate
    use rodyn_bench_jobs, only: budget_monitor, probe_recorder, text_length, most_probes
    implicit none (type, external)
 
@@ -183,7 +183,7 @@ contains
          call new_integrator(integrator, motion, trim(method), options, error)
          if (allocated(error)) return
          call integrator%set_monitor(monitor)
-         call simulate(motion, integrator, times, maxval(times), recorder, y, t, error)
+         call simulate(motion, integrator, listed_times(times), maxval(times), recorder, y, t, error)
          call system_clock(finish)
          counts = integrator%statistics()
          call integrator%finalize()

@@ -11,7 +11,7 @@ module test_ensemble
    use rodyn_integrators, only: new_integrator
    use rodyn_lane_scene, only: suits_lanes, are_alike
    use rodyn_ensemble, only: ensemble_member, ensemble_client, run_ensemble
-   use rodyn_simulation, only: observer_type, simulate
+   use rodyn_simulation, only: observer_type, listed_times, simulate
    use test_testing, only: unittest, new_test, check
    use test_random_scenes, only: random_case, seed_random, kind_name, n_kinds, uniform
    implicit none (type, external)
@@ -202,7 +202,7 @@ contains
       if (allocated(error)) return
       call initial_state(motion, client%configs(i)%initial, y)
       allocate (observer%kept%states(size(y), size(client%times)), source=0.0_wp)
-      call simulate(motion, integrator, client%times, t_end, observer, y, observer%kept%t, error)
+      call simulate(motion, integrator, listed_times(client%times), t_end, observer, y, observer%kept%t, error)
       observer%kept%counts = integrator%statistics()
       kept = observer%kept
    end subroutine run_alone

@@ -12,7 +12,7 @@ module test_trajectories
    use rodyn_run_file, only: run_row, new_run_row
    use rodyn_integrator, only: integrator_type, solver_options
    use rodyn_integrators, only: new_integrator
-   use rodyn_simulation, only: observer_type, simulate
+   use rodyn_simulation, only: observer_type, listed_times, simulate
    implicit none (type, external)
    private
    public :: trajectory, integrate
@@ -64,7 +64,7 @@ contains
          result%rows(i) = new_run_row(scene%n)
       end do
       motion%events%most = config%solver%max_events
-      call simulate(motion, integrator, times, times(size(times)), result, y, t, error)
+      call simulate(motion, integrator, listed_times(times), times(size(times)), result, y, t, error)
       result%n_events = motion%events%n_logged
       result%events = motion%events%log
       call integrator%finalize()

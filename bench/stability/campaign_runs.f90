@@ -9,7 +9,7 @@ module rodyn_bench_campaign_runs
    use rodyn_integrator, only: integrator_type, solver_options, monitor_type
    use rodyn_integrators, only: new_integrator
    use rodyn_method_choice, only: method_choice, choose_method
-   use rodyn_simulation, only: observer_type, simulate
+   use rodyn_simulation, only: observer_type, listed_times, simulate
    use rodyn_run, only: options_of
    use rodyn_step_limit, only: check_fixed_step
    implicit none (type, external)
@@ -129,7 +129,7 @@ contains
       monitor%deadline = finish + budget
       call integrator%set_monitor(monitor)
       allocate (recorder%errors(size(times)), source=0.0_wp)
-      call simulate(motion, integrator, times, times(size(times)), recorder, result%y, result%t, error)
+      call simulate(motion, integrator, listed_times(times), times(size(times)), recorder, result%y, result%t, error)
       call cpu_time(finish)
       result%seconds = finish - start
       result%n_steps = integrator%n_steps

@@ -400,7 +400,7 @@ def test_no_signal_and_no_full_disk_leaves_a_file_that_looks_complete(tmp_path):
 def test_too_little_address_space_is_told_not_suffered(place):
     """Whatever the limit: the run ends by itself, and never with a file that is not complete. One thread: those that OpenBLAS
     makes when it is loaded wait for memory for ever, and the end of the program waits for them."""
-    for megabytes in (20, 60, 100, 200, 400):
+    for megabytes in (20, 60, *range(80, 260, 15), 400):
         limit = megabytes << 20
         result = subprocess.run([RODYN, "run", "case.nml", "--force"], cwd=place, capture_output=True, text=True, timeout=60,
                                 env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},

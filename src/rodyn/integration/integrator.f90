@@ -68,7 +68,7 @@ module rodyn_integrator
       integer(i8), private :: n_judged = 0     !! steps and time at the last look at the pace
       real(wp), private :: t_judged = 0.0_wp   !! [s]
       integer(i8), private :: clock_report = 0, clock_look = 0 !! wall clock at the last report, the last look [counts]
-      integer, private :: steps_to_look = 1, stride = 1        !! the clock is read every `stride` steps
+      integer, private :: steps_to_look = 1, stride = 1        !! the clock is read every `stride` steps and outputs
    contains
       procedure(start_interface), deferred :: start
       procedure(advance_interface), deferred :: advance
@@ -79,6 +79,7 @@ module rodyn_integrator
       procedure :: begin_interval
       procedure :: check_target
       procedure :: permit_step
+      procedure :: heed_monitor
       procedure :: state_within
    end type integrator_type
 
@@ -231,16 +232,23 @@ contains
          self%n_judged = self%n_steps
          self%t_judged = self%t_good
       end if
-      self%n_steps = self%n_steps + 1
+      call self%heed_monitor(self%t_good, error)
+      if (.not. allocated(error)) self%n_steps = self%n_steps + 1
+   end subroutine permit_step
+
+   !> Let the monitor speak and stop the run. Called before each internal step and after each output, of which there may be
+   !> any number in a step.
+   subroutine heed_monitor(self, t, error)
+      class(integrator_type), intent(inout) :: self
+      real(wp), intent(in) :: t                           !! of the last good state [s]
+      type(error_type), allocatable, intent(out) :: error !! a stop was requested
+
       if (.not. associated(self%monitor)) return
       self%steps_to_look = self%steps_to_look - 1
       if (self%steps_to_look > 0) return
-      call look_at_clock(self)
-      if (self%monitor%stop_requested()) then
-         self%n_steps = self%n_steps - 1
-         call raise(error, 'stopped on request at t = '//time_text(self%t_good)//' s', exit_stopped)
-      end if
-   end subroutine permit_step
+      call look_at_clock(self, t)
+      if (self%monitor%stop_requested()) call raise(error, 'stopped on request at t = '//time_text(t)//' s', exit_stopped)
+   end subroutine heed_monitor
 
    !> After `judged_steps` steps: would it take `hopeless` of them to get to the stop time?
    pure logical function is_hopeless(done, left)
@@ -260,9 +268,10 @@ contains
              ' s; loads or initial values far out of proportion?'
    end function hopeless_text
 
-   !> Report when it is time, and choose how many steps to take until the next look: about 20 ms of them.
-   subroutine look_at_clock(self)
+   !> Report when it is time, and choose how many steps and outputs to make until the next look: about 20 ms of them.
+   subroutine look_at_clock(self, t)
       class(integrator_type), intent(inout) :: self
+      real(wp), intent(in) :: t !! [s]
       integer, parameter :: longest_stride = 4096
       integer(i8) :: now, rate
       real(wp) :: since_look
@@ -278,7 +287,7 @@ contains
       self%steps_to_look = self%stride
       if (real(now - self%clock_report, wp) < report_interval*real(rate, wp)) return
       self%clock_report = now
-      call self%monitor%report(self%t_good, self%n_steps - 1)
+      call self%monitor%report(t, self%n_steps)
    end subroutine look_at_clock
 
    !> A time for a message: ten digits, no idle zeros.

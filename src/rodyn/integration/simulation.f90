@@ -6,7 +6,18 @@ module rodyn_simulation
    use rodyn_integrator, only: integrator_type
    implicit none (type, external)
    private
-   public :: observer_type, simulate
+   public :: observer_type, output_times, listed_times, even_times, simulate
+
+   !> Times at which the state is wanted, in increasing order. Evenly spaced ones are computed when they come: a list of a
+   !> hundred million would take longer to make than most runs.
+   type :: output_times
+      private
+      integer :: n = 0
+      real(wp), allocatable :: listed(:) !! (n) [s]
+      real(wp) :: t_end = 0.0_wp         !! without a list: the last of n times from 0 on [s]
+   contains
+      procedure :: time
+   end type output_times
 
    !> Someone who takes down the state at the output times.
    type, abstract :: observer_type
@@ -28,13 +39,41 @@ module rodyn_simulation
 
 contains
 
+   !> The times of a list.
+   pure function listed_times(list) result(times)
+      real(wp), intent(in) :: list(:) !! increasing [s]
+      type(output_times) :: times
+      times%n = size(list)
+      times%listed = list
+   end function listed_times
+
+   !> From 0 to t_end in equal intervals.
+   pure function even_times(t_end, n_intervals) result(times)
+      real(wp), intent(in) :: t_end !! [s]
+      integer, intent(in) :: n_intervals
+      type(output_times) :: times
+      times%n = n_intervals + 1
+      times%t_end = t_end
+   end function even_times
+
+   !> Number k of them [s].
+   pure real(wp) function time(self, k)
+      class(output_times), intent(in) :: self
+      integer, intent(in) :: k !! 1 ... n
+      if (allocated(self%listed)) then
+         time = self%listed(k)
+      else
+         time = self%t_end*(real(k - 1, wp)/(self%n - 1))
+      end if
+   end function time
+
    !> Integrate from t = 0 to t_end and show the observer the states at `times`. At each switch of a load or a kink, at
    !> each release and each event of a hinge the integration stops exactly and starts anew. On failure t and y are the last
    !> good ones.
    subroutine simulate(motion, integrator, times, t_end, observer, y, t, error)
       type(motion_type), intent(inout), target :: motion
       class(integrator_type), intent(inout) :: integrator !! made for this motion
-      real(wp), intent(in) :: times(:)                    !! increasing, within [0, t_end] [s]
+      type(output_times), intent(in) :: times             !! within [0, t_end]
       real(wp), intent(in) :: t_end                       !! [s]
       class(observer_type), intent(inout) :: observer
       real(wp), contiguous, intent(inout) :: y(:)         !! in: state at t = 0; out: the last one
@@ -69,10 +108,11 @@ contains
          real(wp) :: target_time
 
          target_time = t_stop
-         if (next <= size(times)) target_time = min(times(next), t_stop)
+         if (next <= times%n) target_time = min(times%time(next), t_stop)
          call integrator%advance(target_time, y, t, error)
          if (allocated(error)) return
          call observe_now()
+         if (.not. allocated(error)) call integrator%heed_monitor(t, error)
          if (allocated(error) .or. .not. integrator%at_event) return
          call motion%respond(t, integrator%crossed, y, error)
          if (allocated(error) .or. t >= t_stop) return
@@ -81,8 +121,8 @@ contains
 
       !> Show the state if the next output time has come.
       subroutine observe_now()
-         if (next > size(times)) return
-         if (times(next) > t) return
+         if (next > times%n) return
+         if (times%time(next) > t) return
          call motion%dynamics%move_kinks(t)
          call observer%observe(motion, t, y, error)
          next = next + 1

@@ -11,7 +11,7 @@ module rodyn_run
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, time_text
    use rodyn_integrators, only: new_integrator, sundials_version
    use rodyn_method_choice, only: method_choice, choose_method
-   use rodyn_simulation, only: observer_type, simulate
+   use rodyn_simulation, only: observer_type, even_times, simulate
    use rodyn_ledger, only: fill_row
    use rodyn_run_needs, only: check_needs
    use rodyn_run_file, only: run_file, run_header, run_row, solver_report, new_run_row, is_finite, check_output_path
@@ -65,7 +65,6 @@ contains
       logical :: silent, replace
       integer(i8) :: clock_start, clock_end, clock_rate
       real(wp) :: t
-      integer :: i
 
       silent = .false.
       replace = .false.
@@ -109,8 +108,7 @@ contains
       recorder%row = new_run_row(scene%n)
       recorder%validity = new_validity(scene, config%model%deflection_limit)
       call integrator%set_monitor(progress)
-      call simulate(motion, integrator, [(config%t_end*(real(i, wp)/config%n_outputs), i=0, config%n_outputs)], &
-                    config%t_end, recorder, y, t, failure)
+      call simulate(motion, integrator, even_times(config%t_end, config%n_outputs), config%t_end, recorder, y, t, failure)
       call progress%finish()
       call system_clock(clock_end)
       written = path

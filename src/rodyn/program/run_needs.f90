@@ -12,8 +12,8 @@ module rodyn_run_needs
 
    real(wp), parameter :: word = 8.0_wp                !! of a real number [bytes]
    real(wp), parameter :: matrices = 4.75_wp           !! n_dof x n_dof, of the assembled kernel
-   !> Whatever the scene; without its 32 MB OpenBLAS would wait for them for ever [bytes].
-   real(wp), parameter :: of_program = 1.0e8_wp
+   !> Whatever the scene; OpenBLAS takes 134 MB at its first call, and without them would wait for ever [bytes].
+   real(wp), parameter :: of_program = 1.5e8_wp
    real(wp), parameter :: least_compressed = 0.7_wp    !! of the size of states that move
 
 contains
@@ -27,7 +27,7 @@ contains
       real(wp) :: memory, disk, rows
 
       rows = real(config%n_outputs, wp) + 1.0_wp
-      memory = of_program + memory_of_scene(config) + 2.0_wp*word*rows ! the output times, while they are made twice
+      memory = of_program + memory_of_scene(config)
       call check_memory('n_rods = '//to_text(config%chain%n_rods)//", kernel = '"//trim(config%model%kernel)// &
                         "', n_outputs = "//to_text(config%n_outputs), memory, error)
       if (allocated(error)) return

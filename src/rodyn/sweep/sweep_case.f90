@@ -21,7 +21,7 @@ module rodyn_sweep_case
    use rodyn_run, only: options_of
    use rodyn_run_file, only: run_row, new_run_row
    use rodyn_scene, only: scene_type, new_scene
-   use rodyn_simulation, only: observer_type, simulate
+   use rodyn_simulation, only: observer_type, listed_times, simulate
    use rodyn_sweep_config, only: sweep_config, is_ratio, value_text
    use rodyn_step_limit, only: check_fixed_step
    use rodyn_sweep_plan, only: sweep_plan
@@ -338,7 +338,7 @@ contains
       monitor = new_monitor(sweep, pulse, clock_start, late)
       call integrator%set_monitor(monitor)
       call system_clock(clock_a, clock_rate)
-      call simulate(motion, integrator, times, t_end, keeper, y, keeper%kept%t_reached, error)
+      call simulate(motion, integrator, listed_times(times), t_end, keeper, y, keeper%kept%t_reached, error)
       call system_clock(clock_b)
       keeper%kept%integration_seconds = real(clock_b - clock_a, wp)/real(clock_rate, wp)
       stats = integrator%statistics()
