@@ -21,7 +21,7 @@ RODYN = os.environ.get("RODYN", str(ROOT / "bin" / "rodyn"))
 # Allocations by which the longer run may exceed the shorter one, whatever the number of steps. The loop itself makes none;
 # the rest is what does not repeat from run to run: a text of other length (t_end in `resolved_input`, counts printed with
 # more digits), and the compressed rows, whose number of bytes depends on their values.
-TOLERANCE = 20
+TOLERANCE = 40
 
 # The number of modes that `gauss` takes for stiff changes a few times in a run, with ten arrays each time.
 CHANGES_OF_MODES = 40
@@ -116,7 +116,7 @@ def growth(counter, directory, *what) -> tuple[int, int, int]:
     short = count(counter, directory, case(*what, 0.20))
     long = count(counter, directory, case(*what, 0.40))
     assert short[0] > 100  # the counter counts
-    assert long[1] > 1.5*short[1] and long[2] - short[2] > 10*TOLERANCE
+    assert long[1] > 1.5*short[1] and long[2] - short[2] > 5*TOLERANCE  # one in each would be seen
     return long[0] - short[0], long[1] - short[1], long[3] - short[3]
 
 
