@@ -2,7 +2,7 @@
 module test_modes
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
-   use rodyn_case_config, only: case_config, load_config
+   use rodyn_case_config, only: case_config, kink_config, load_config
    use rodyn_case_reader, only: read_case
    use rodyn_equilibrium, only: find_equilibrium
    use rodyn_lapack, only: dgeev
@@ -34,6 +34,7 @@ contains
          new_test('a thrust along a rod weakens its hinge, up to buckling', buckling), &
          new_test('modes move as the integration in time', integrated_mode), &
          new_test('free hinges are mechanisms, not small frequencies', free_hinges), &
+         new_test('a kink that moves later changes no mode at the start', later_kink), &
          new_test('equilibria are at rest', equilibria), &
          new_test('a torque on a free spacecraft leaves no equilibrium', no_equilibrium)]
    end subroutine collect_modes
@@ -442,6 +443,42 @@ contains
    end subroutine free_hinges
 
    !> Kinks fold a chain at rest; on a turning spacecraft with the hinge off its axis the right-hand side is zero.
+   subroutine later_kink(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+      type(mode_set) :: straight, later, early
+
+      call rigid_chain(config, 2)
+      config%chain%kink(:) = [0.5_wp, -0.2_wp]
+      config%initial%phi = [0.5_wp, 1.5_wp] ! bent, so that what accelerates it matters
+      config%t_end = 10.0_wp
+      call find(straight)
+      allocate (config%kink_programs(1))
+      config%kink_programs(1) = kink_config(hinge=1, t_start=1.0_wp, t_end=2.0_wp, value=0.5_wp)
+      if (.not. allocated(error)) call find(later)
+      config%kink_programs(1)%t_start = -2.0_wp
+      config%kink_programs(1)%t_end = -1.0_wp
+      if (.not. allocated(error)) call find(early)
+      if (allocated(error)) return
+      call check(error, maxval(abs(later%eigenvalue - straight%eigenvalue)) <= 0.0_wp, 'a kink acts before it is there')
+      if (allocated(error)) return
+      call check(error, maxval(abs(early%eigenvalue - straight%eigenvalue)) > 1.0e-3_wp, 'a kink that is there does not act')
+
+   contains
+
+      subroutine find(modes)
+         type(mode_set), intent(out) :: modes
+         type(scene_type) :: scene
+         type(motion_type) :: motion
+         type(linear_model) :: model
+
+         call new_scene(scene, config, error)
+         if (.not. allocated(error)) call new_motion(motion, scene, .false., error)
+         if (.not. allocated(error)) call modes_at_start(motion, config, .false., .false., .false., model, modes, error)
+      end subroutine find
+
+   end subroutine later_kink
+
    subroutine equilibria(error)
       type(error_type), allocatable, intent(out) :: error
       type(case_config) :: config
