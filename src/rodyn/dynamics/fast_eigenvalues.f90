@@ -3,7 +3,8 @@
 !>
 !> M^-1 K is symmetric in the inner product of K, x.K y; Lanczos' tridiagonal matrix then has an eigenvalue that is never above
 !> the largest of M^-1 K and soon within a thousandth of it (Golub & Van Loan, Matrix Computations, sec. 10.1). The same
-!> holds for D.
+!> holds for D. Symmetry needs springs without moments and the tangent in closed form; the estimate that a choice of method is
+!> content with does without either (`rodyn_fastest_rates`).
 module rodyn_fast_eigenvalues
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
