@@ -21,13 +21,15 @@ module rodyn_hinge_events
    integer, parameter :: crowd = 32          !! events of one hinge in no time are chatter
    real(wp), parameter :: no_time = 1.0e-8_wp !! of the simulated time
 
+   !> Something that a hinge did.
    type :: hinge_event
       real(wp) :: time = 0.0_wp !! [s]
-      integer :: hinge = 0
+      integer :: hinge = 0      !! 0..n-1
       integer :: kind = 0       !! of `kind_names`
       real(wp) :: energy_lost = 0.0_wp !! [J]
    end type hinge_event
 
+   !> What is watched, and what has happened.
    type :: event_set
       logical :: watches = .false.      !! some hinge has a mechanism
       integer :: n = 0                  !! margins
@@ -70,6 +72,7 @@ contains
                 events%moment_rate(0:law%n), source=0.0_wp)
    end subroutine new_event_set
 
+   !> Does the mechanism have this part?
    pure logical function has_part(mechanism, part)
       type(hinge_mechanism), intent(in) :: mechanism
       integer, intent(in) :: part

@@ -20,7 +20,7 @@ contains
       integer :: i, k
 
       do i = 1, size(config%kink_programs)
-         call check_exists(checked, 'kink_program', i, 'hinge', config%kink_programs(i)%hinge, config%chain%n_rods)
+         call check_exists(checked, 'kink_program', i, config%kink_programs(i)%hinge, config%chain%n_rods)
          associate (law => config%kink_programs(i)%law)
             call check_law_keys(checked, 'kink_program', i, law, law_keys, &
                                 [(kink_law_takes(law, trim(law_keys(k))), k=1, size(law_keys))], &
@@ -30,7 +30,7 @@ contains
          call check_jumps(checked, i, config%kink_programs(i), config)
       end do
       do i = 1, size(config%hinges)
-         call check_exists(checked, 'hinge', i, 'hinge', config%hinges(i)%hinge, config%chain%n_rods)
+         call check_exists(checked, 'hinge', i, config%hinges(i)%hinge, config%chain%n_rods)
          call check_once(checked, i, config%hinges)
          call check_release(checked, i, config%hinges)
          call check_stops(checked, i, config%hinges(i))
@@ -39,13 +39,14 @@ contains
       end do
    end subroutine check_moving_hinges
 
-   subroutine check_exists(checked, group, i, key, hinge, n_rods)
+   !> Hinges are numbered from 0; that a number is not negative stands in the table.
+   subroutine check_exists(checked, group, i, hinge, n_rods)
       type(checked_document), intent(inout) :: checked
-      character(len=*), intent(in) :: group, key
+      character(len=*), intent(in) :: group
       integer, intent(in) :: i, hinge, n_rods !! n_rods 0: not known
       if (n_rods < 1 .or. hinge < n_rods) return
-      if (.not. is_sound(checked, group, i, key)) return
-      call blame(checked, group, i, key, no_such('hinge', 0, n_rods - 1))
+      if (.not. is_sound(checked, group, i, 'hinge')) return
+      call blame(checked, group, i, 'hinge', no_such('hinge', 0, n_rods - 1))
    end subroutine check_exists
 
    !> A program must not end before it begins; only a ramp may be a step. Tables have values at times that increase.
@@ -94,6 +95,7 @@ contains
       end do
    end subroutine check_jumps
 
+   !> One group for each hinge.
    subroutine check_once(checked, i, hinges)
       type(checked_document), intent(inout) :: checked
       integer, intent(in) :: i
@@ -126,6 +128,7 @@ contains
       call blame(checked, 'hinge', i, 'release_after', 'that hinge must have a latch_angle of its own')
    end subroutine check_release
 
+   !> Stops, freeplay and locks need their stiffnesses, and these need them.
    subroutine check_stops(checked, i, hinge)
       type(checked_document), intent(inout) :: checked
       integer, intent(in) :: i
@@ -146,6 +149,7 @@ contains
          call blame(checked, 'hinge', i, 'lock_damping', 'goes with lock_stiffness only')
    end subroutine check_stops
 
+   !> Moment and velocity of dry friction go together.
    subroutine check_friction(checked, i, hinge)
       type(checked_document), intent(inout) :: checked
       integer, intent(in) :: i
