@@ -23,21 +23,27 @@ class Shape(NamedTuple):
 def shapes(run: Run, rows: np.ndarray, magnification: float = 1.0, frame: str = "moving") -> list[Shape]:
     """Shapes at rows of the run (rising)."""
     names = ["phi", "alpha", "beta", "displacement_x", "displacement_y", "rotation"]
-    state = {name: run.rows(name, rows) for name in names}
-    bubble = bubbles(run, rows)
+    state = {name: run.rows(name, rows) for name in names} | {"bubble": bubbles(run, rows)}
     time = run.rows("time", rows)
-    hinge = np.array([run.number("spacecraft", "hinge_x", 0.0), run.number("spacecraft", "hinge_y", 0.0)])
-    length = run.per_rod("length")
-    outline = body_outline(run)
-    result = []
-    for i, t in enumerate(time):
-        nodes, rods = chain(hinge, length, state["phi"][i], state["alpha"][i], state["beta"][i], magnification, bubble[i])
-        shape = Shape(float(t), np.zeros(2), outline, nodes, rods)
-        if frame == "inertial":
-            displacement = np.array([state["displacement_x"][i], state["displacement_y"][i]])
-            shape = turned(shape, displacement, float(state["rotation"][i]))
-        result.append(shape)
-    return result
+    place = Place(run)
+    return [place.shape({name: values[i] for name, values in state.items()}, frame, magnification, float(t)) for i, t in enumerate(time)]
+
+
+class Place:
+    """What all configurations of a file have in common."""
+
+    def __init__(self, run: Run):
+        self.hinge = np.array([run.number("spacecraft", "hinge_x", 0.0), run.number("spacecraft", "hinge_y", 0.0)])
+        self.length = run.per_rod("length")
+        self.outline = body_outline(run)
+
+    def shape(self, state: dict[str, np.ndarray], frame: str, magnification: float = 1.0, time: float = 0.0) -> Shape:
+        """The configuration of a state: phi, alpha, beta (and bubble) of all rods; displacement and rotation of the spacecraft."""
+        nodes, rods = chain(self.hinge, self.length, state["phi"], state["alpha"], state["beta"], magnification, state.get("bubble", 0.0))
+        shape = Shape(time, np.zeros(2), self.outline, nodes, rods)
+        if frame == "moving":
+            return shape
+        return turned(shape, np.array([state["displacement_x"], state["displacement_y"]]), float(state["rotation"]))
 
 
 def chain(hinge: np.ndarray, length: np.ndarray, phi: np.ndarray, alpha: np.ndarray, beta: np.ndarray,

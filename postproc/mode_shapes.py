@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import command
 import numpy as np
 import style
-from geometry import Shape, body_outline, chain, limits, turned
+from geometry import Place, Shape, limits
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from rodyn_data import DataError, Modes, open_modes
@@ -60,27 +60,20 @@ def draw(found: Modes, modes: Sequence[int], amplitude: float, frame: str) -> Fi
 
 def swing(found: Modes, i: int, amplitude: float, frame: str) -> list[Shape]:
     """The state, then the mode at four phases: both ends of the swing, and a quarter after each."""
-    state = found.state()
-    still = configuration(found, state, frame)
-    change = found.shape(i)
-    moved = [configuration(found, {name: state[name] + np.real(change[name] * 1e-6 * turn) for name in state}, frame) for turn in (1, 1j)]
-    largest = max(np.abs(shape.nodes - still.nodes).max() for shape in moved) / 1e-6
+    place, state, change = Place(found), found.state(), found.shape(i)
+
+    def moved(factor: complex) -> Shape:
+        return place.shape({name: state[name] + np.real(change[name] * factor) for name in state}, frame)
+
+    still = place.shape(state, frame)
+    largest = max(np.abs(moved(1e-6 * turn).nodes - still.nodes).max() for turn in (1, 1j)) / 1e-6
     scale = amplitude * found.per_rod("length").sum() / largest if largest > 0 else 0.0
     # A slope alone moves no node: keep angles within what a picture can show.
     widest = max(np.abs(change[name]).max(initial=0.0) for name in ("phi", "alpha", "beta", "rotation"))
+    if "bubble" in change:
+        widest = max(widest, np.max(3.0 * np.abs(change["bubble"]) / place.length))  # the slope of that shape
     scale = min(scale, 0.5 / widest) if widest > 0 else scale
-    phases = [configuration(found, {name: state[name] + np.real(change[name] * scale * turn) for name in state}, frame)
-              for turn in (1, -1, 1j, -1j)]
-    return [still, *phases]
-
-
-def configuration(found: Modes, state: dict[str, np.ndarray], frame: str) -> Shape:
-    hinge = np.array([found.number("spacecraft", "hinge_x", 0.0), found.number("spacecraft", "hinge_y", 0.0)])
-    nodes, rods = chain(hinge, found.per_rod("length"), state["phi"], state["alpha"], state["beta"], 1.0)
-    shape = Shape(0.0, np.zeros(2), body_outline(found), nodes, rods)
-    if frame == "moving":
-        return shape
-    return turned(shape, np.array([state["displacement_x"], state["displacement_y"]]), float(state["rotation"]))
+    return [still, *(moved(scale * turn) for turn in (1, -1, 1j, -1j))]
 
 
 def draw_mode(axes: Axes, panel: Sequence[Shape], frame: str) -> None:

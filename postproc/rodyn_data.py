@@ -286,7 +286,8 @@ class Modes(Run):
     def state(self) -> dict[str, np.ndarray]:
         """The coordinates about which the equations were linearised; slopes that follow from moments are left out."""
         values = dict(zip(texts(self.file["coordinate"]), self.file["state"][()], strict=True))
-        per_rod = {name: np.array([values.get(f"{name}_{k}", 0.0) for k in range(1, self.n_rods + 1)]) for name in ("phi", "alpha", "beta")}
+        names = [name for name in ("phi", "alpha", "beta", "bubble") if f"{name}_real" in self.file]
+        per_rod = {name: np.array([values.get(f"{name}_{k}", 0.0) for k in range(1, self.n_rods + 1)]) for name in names}
         return per_rod | {name: np.float64(values.get(name, 0.0)) for name in ("displacement_x", "displacement_y", "rotation")}
 
 

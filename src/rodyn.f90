@@ -13,7 +13,7 @@
 module rodyn
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
-   use rodyn_case_config, only: case_config, load_config, profile_config
+   use rodyn_case_config, only: case_config, hinge_config, kink_config, load_config, profile_config
    use rodyn_case_reader, only: read_case, parse_case, resolved_case, default_case
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_motion, only: motion_type, new_motion, initial_state
@@ -25,7 +25,8 @@ module rodyn
    implicit none (type, external)
    private
    public :: wp, error_type
-   public :: case_config, load_config, profile_config, analyse_modes, read_case, parse_case, resolved_case, default_case, run_case
+   public :: case_config, hinge_config, kink_config, load_config, profile_config
+   public :: read_case, parse_case, resolved_case, default_case, run_case, analyse_modes
    public :: scene_type, new_scene, motion_type, new_motion, initial_state, natural_frequencies
    public :: user_load
    public :: program_version

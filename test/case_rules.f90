@@ -49,7 +49,7 @@ contains
          'c.nml:3: &kink_program hinge = 4: there is no such hinge; they are numbered 0..3'//nl// &
          "c.nml:4: &kink_program rate: is required when law = 'sine'"//nl// &
          "c.nml:5: &kink_program value = 1: does not go with law = 'table'"//nl// &
-         'c.nml:5: &kink_program times = 0, 0: must increase'//nl// &
+         'c.nml:5: &kink_program times = 0, 0: must increase, but value 2, 0.00000, follows 0.00000 [s]'//nl// &
          'c.nml:5: &kink_program values = 1: must be as many as times: 2, not 1'//nl// &
          "c.nml:6: &kink_program t_start = 1: must be before t_end; only law = 'ramp' may be a step"//nl// &
          "c.nml:7: &kink_program law = 'ramp': must be 'smooth_step' or 'table' at a hinge that is held or latches: "// &

@@ -6,24 +6,11 @@ module test_integrators
    use rodyn_ode, only: ode_system
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, monitor_type, time_text
    use rodyn_integrators, only: new_integrator, sundials_version
+   use test_oscillators, only: oscillator, new_oscillator
    use test_testing, only: unittest, new_test, check, check_close
    implicit none (type, external)
    private
    public :: collect_integrators
-
-   !> x'' = -w^2 x + f, f = 0 before t_switch and `force` after it; the third state, when there is one, is the
-   !> quadrature of v^2. Records what it was asked.
-   type, extends(ode_system) :: oscillator
-      real(wp) :: frequency = 1.0_wp   !! w [rad/s]
-      real(wp) :: force = 0.0_wp       !! f now
-      real(wp) :: t_largest = -huge(1.0_wp) !! largest time of a call
-      real(wp) :: t_refuse = huge(1.0_wp)   !! ok = .false. from then on
-      real(wp) :: t_nan = huge(1.0_wp)      !! NaN with ok = .true. from then on
-      integer(i8) :: n_calls = 0
-   contains
-      procedure :: rhs => oscillator_rhs
-      procedure :: jacobian => oscillator_jacobian
-   end type oscillator
 
    !> Robertson's kinetics: stiff, with a conserved sum.
    type, extends(ode_system) :: robertson
@@ -82,34 +69,6 @@ contains
          new_test('sundials tells its version', version_known)]
    end subroutine collect_integrators
 
-   subroutine oscillator_rhs(self, t, y, ydot, ok)
-      class(oscillator), intent(inout) :: self
-      real(wp), intent(in) :: t
-      real(wp), contiguous, intent(in) :: y(:)
-      real(wp), contiguous, intent(out) :: ydot(:)
-      logical, intent(out) :: ok
-      self%n_calls = self%n_calls + 1
-      self%t_largest = max(self%t_largest, t)
-      ok = t < self%t_refuse
-      ydot(1) = y(2)
-      ydot(2) = -self%frequency**2*y(1) + self%force
-      if (self%n_states > 2) ydot(3) = y(2)**2
-      if (t >= self%t_nan) ydot(1) = ieee_value(1.0_wp, ieee_quiet_nan)
-   end subroutine oscillator_rhs
-
-   subroutine oscillator_jacobian(self, t, y, jac, ok)
-      class(oscillator), intent(inout) :: self
-      real(wp), intent(in) :: t
-      real(wp), contiguous, intent(in) :: y(:)
-      real(wp), contiguous, intent(out) :: jac(:, :)
-      logical, intent(out) :: ok
-      ok = t < huge(t)
-      jac = 0.0_wp
-      jac(1, 2) = 1.0_wp
-      jac(2, 1) = -self%frequency**2
-      if (self%n_states > 2) jac(3, 2) = 2.0_wp*y(2)
-   end subroutine oscillator_jacobian
-
    subroutine robertson_rhs(self, t, y, ydot, ok)
       class(robertson), intent(inout) :: self
       real(wp), intent(in) :: t
@@ -167,16 +126,6 @@ contains
       logical :: requested
       requested = self%stop
    end function wants_to_stop
-
-   !> An oscillator with or without its quadrature state.
-   function new_oscillator(frequency, quadrature) result(system)
-      real(wp), intent(in) :: frequency !! [rad/s]
-      logical, intent(in) :: quadrature
-      type(oscillator) :: system
-      system%frequency = frequency
-      system%n_controlled = 2
-      system%n_states = merge(3, 2, quadrature)
-   end function new_oscillator
 
    !> Integrate from (0, y) to t_end with n_outputs equal intervals; y becomes the final state.
    subroutine run(system, method, options, t_end, n_outputs, y, stats, error)

@@ -1,11 +1,11 @@
 !> Locked hinges: against dense systems with Lagrange multipliers, rigid bodies, stiff springs, and conservation laws.
 module test_locks
    use rodyn_kinds, only: wp
-   use rodyn_errors, only: error_type, raise
+   use rodyn_errors, only: error_type
    use rodyn_case_config, only: case_config
-   use rodyn_scene, only: scene_type, new_scene
+   use rodyn_scene, only: scene_type
    use rodyn_accelerations, only: dynamics_type, new_dynamics
-   use rodyn_motion, only: motion_type, new_motion, initial_state, state_invariants
+   use rodyn_motion, only: motion_type, state_invariants
    use rodyn_kinematics, only: invariants_type, invariants
    use rodyn_assembled, only: assembled_system, new_assembled_system, mass_matrix
    use rodyn_hinge_law, only: openings, hinge_moments
@@ -15,6 +15,7 @@ module test_locks
    use rodyn_integrators, only: new_integrator
    use rodyn_lapack, only: dgesv
    use test_testing, only: unittest, new_test, check, check_close
+   use test_motions, only: motion_of, random_motion, check_jacobian, check_energy_rate
    use test_random_scenes, only: random_case, seed_random, uniform, kind_name, n_kinds, allocate_case
    implicit none (type, external)
    private
@@ -42,35 +43,6 @@ contains
          new_test('a driven lock follows its opening', test_driven), &
          new_test('frequencies and fastest rates with locks', test_frequencies)]
    end subroutine collect_locks
-
-   !> A random scene with its initial state and loads; no load is switched within (0, 1).
-   subroutine random_motion(motion, y, which, n, kernel, error)
-      type(motion_type), intent(out) :: motion
-      real(wp), allocatable, intent(out) :: y(:)
-      integer, intent(in) :: which, n
-      character(len=*), intent(in) :: kernel
-      type(error_type), allocatable, intent(out) :: error
-      type(case_config) :: config
-
-      call random_case(config, which, n)
-      config%model%kernel = kernel
-      call motion_of(motion, y, config, error)
-   end subroutine random_motion
-
-   subroutine motion_of(motion, y, config, error)
-      type(motion_type), intent(out) :: motion
-      real(wp), allocatable, intent(out) :: y(:)
-      type(case_config), intent(in) :: config
-      type(error_type), allocatable, intent(out) :: error
-      type(scene_type) :: scene
-
-      call new_scene(scene, config, error)
-      if (allocated(error)) return
-      call new_motion(motion, scene, .true., error)
-      if (allocated(error)) return
-      call motion%dynamics%set_regime(0.0_wp, 1.0_wp)
-      call initial_state(motion, config%initial, y)
-   end subroutine motion_of
 
    !> Some hinges: none of them, all, or any.
    function random_locks(n) result(locked)
@@ -678,15 +650,11 @@ contains
    subroutine test_energy_rate(error)
       type(error_type), allocatable, intent(out) :: error
       type(motion_type) :: motion
-      type(invariants_type) :: before, after
-      real(wp), allocatable :: y(:), ydot(:)
+      real(wp), allocatable :: y(:)
       logical, allocatable :: locked(:)
-      real(wp) :: rate, h, scale
-      logical :: ok
       integer :: which, n
 
       call seed_random(20)
-      h = 1.0e-6_wp
       do which = 1, n_kinds
          if (index(kind_name(which), 'paper distributed dynamic') > 0) cycle
          do n = 1, 6
@@ -694,19 +662,8 @@ contains
             if (allocated(error)) return
             locked = random_locks(n)
             call lock_at_once(motion, y, locked, error)
+            if (.not. allocated(error)) call check_energy_rate(motion, y, 1.0e-3_wp, kind_name(which), error)
             if (allocated(error)) return
-            allocate (ydot(size(y)))
-            call motion%rhs(0.3_wp, y, ydot, ok)
-            before = state_invariants(motion, y - h*ydot)
-            after = state_invariants(motion, y + h*ydot)
-            associate (last => motion%n_controlled)
-               rate = (after%kinetic + after%elastic - before%kinetic - before%elastic)/(2.0_wp*h)
-               scale = 1.0e-3_wp + sum(abs(ydot(last + 1:))) + sum(ydot**2)*1.0e-3_wp
-               call check(error, abs(rate - (ydot(last + 1) - ydot(last + 2))) < 1.0e-5_wp*scale, &
-                          kind_name(which)//': energy does not balance')
-               if (allocated(error)) return
-            end associate
-            deallocate (ydot)
          end do
       end do
    end subroutine test_energy_rate
@@ -714,11 +671,9 @@ contains
    subroutine test_jacobian(error)
       type(error_type), allocatable, intent(out) :: error
       type(motion_type) :: motion
-      real(wp), allocatable :: y(:), jac(:, :), plus(:), minus(:), yp(:), ym(:), column(:)
+      real(wp), allocatable :: y(:)
       logical, allocatable :: locked(:)
-      real(wp) :: step, worst
-      logical :: ok
-      integer :: which, n, j
+      integer :: which, n
 
       call seed_random(21)
       do which = 1, n_kinds
@@ -727,26 +682,8 @@ contains
             if (allocated(error)) return
             locked = random_locks(n)
             call lock_at_once(motion, y, locked, error)
+            if (.not. allocated(error)) call check_jacobian(motion, y, kind_name(which), error)
             if (allocated(error)) return
-            allocate (jac(size(y), size(y)), plus(size(y)), minus(size(y)))
-            call motion%jacobian(0.3_wp, y, jac, ok)
-            call check(error, ok, 'no Jacobian')
-            if (allocated(error)) return
-            do j = 1, size(y)
-               step = epsilon(1.0_wp)**(1.0_wp/3.0_wp)*max(1.0_wp, abs(y(j)))
-               yp = y
-               ym = y
-               yp(j) = y(j) + step
-               ym(j) = y(j) - step
-               call motion%rhs(0.3_wp, yp, plus, ok)
-               call motion%rhs(0.3_wp, ym, minus, ok)
-               column = (plus - minus)/(yp(j) - ym(j))
-               worst = maxval(abs(jac(:, j) - column))/maxval(abs(jac))
-               ! Truncation of central differences: step^2 relative, with margin for third derivatives.
-               call check(error, worst < 1.0e-7_wp, kind_name(which)//': Jacobian is off')
-               if (allocated(error)) return
-            end do
-            deallocate (jac, plus, minus)
          end do
       end do
    end subroutine test_jacobian

@@ -2,15 +2,16 @@
 module test_modes
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
-   use rodyn_case_config, only: case_config, load_config
+   use rodyn_case_config, only: case_config, kink_config, load_config
    use rodyn_case_reader, only: read_case
    use rodyn_equilibrium, only: find_equilibrium
    use rodyn_lapack, only: dgeev
    use rodyn_linear_model, only: linear_model, new_linear_model
    use rodyn_modal_analysis, only: modes_at_start
    use rodyn_modes, only: mode_set, new_modes, rigid_body, mechanism, oscillation
-   use rodyn_motion, only: motion_type, new_motion, initial_state
+   use rodyn_motion, only: motion_type, new_motion
    use rodyn_scene, only: scene_type, new_scene
+   use test_motions, only: motion_of
    use test_random_scenes, only: allocate_case, kind_name, n_kinds, random_case, seed_random
    use test_testing, only: check, check_close, new_test, unittest
    implicit none (type, external)
@@ -34,23 +35,10 @@ contains
          new_test('a thrust along a rod weakens its hinge, up to buckling', buckling), &
          new_test('modes move as the integration in time', integrated_mode), &
          new_test('free hinges are mechanisms, not small frequencies', free_hinges), &
+         new_test('a kink that moves later changes no mode at the start', later_kink), &
          new_test('equilibria are at rest', equilibria), &
          new_test('a torque on a free spacecraft leaves no equilibrium', no_equilibrium)]
    end subroutine collect_modes
-
-   subroutine new_case_motion(config, motion, y, error)
-      type(case_config), intent(in) :: config
-      type(motion_type), intent(out) :: motion
-      real(wp), allocatable, intent(out) :: y(:)
-      type(error_type), allocatable, intent(out) :: error
-      type(scene_type) :: scene
-
-      call new_scene(scene, config, error)
-      if (.not. allocated(error)) call new_motion(motion, scene, .false., error)
-      if (allocated(error)) return
-      call motion%dynamics%set_regime(0.0_wp, 1.0_wp)
-      call initial_state(motion, config%initial, y)
-   end subroutine new_case_motion
 
    subroutine modes_of(motion, y, modes, error)
       type(motion_type), intent(inout) :: motion
@@ -129,7 +117,7 @@ contains
       do which = 1, n_kinds
          do n = 1, 6
             call random_case(config, which, n)
-            call new_case_motion(config, motion, y, error)
+            call motion_of(motion, y, config, error, ledger=.false.)
             if (.not. allocated(error)) call compare(motion, y, kind_name(which), error)
             if (allocated(error)) return
          end do
@@ -163,7 +151,7 @@ contains
             config%initial%beta_rate = 0.0_wp
             config%initial%omega = merge(1.5_wp, 0.0_wp, variant == 2)
             if (config%spacecraft%motion == 'fixed') config%initial%omega = 0.0_wp
-            call new_case_motion(config, motion, y, error)
+            call motion_of(motion, y, config, error, ledger=.false.)
             if (.not. allocated(error)) call compare(motion, y, kind_name(which)//' at rest', error)
             if (allocated(error)) return
          end do
@@ -187,7 +175,7 @@ contains
       do which = 1, n_kinds
          do n = 1, 4
             call random_case(config, which, n)
-            call new_case_motion(config, motion, y, error)
+            call motion_of(motion, y, config, error, ledger=.false.)
             if (.not. allocated(error)) call modes_of(motion, y, modes, error)
             if (allocated(error)) return
             r = motion%n_q
@@ -220,7 +208,7 @@ contains
       real(wp), allocatable :: y(:), frequency(:)
 
       call read_case('cases/table1.nml', config, error=error)
-      if (.not. allocated(error)) call new_case_motion(config, motion, y, error)
+      if (.not. allocated(error)) call motion_of(motion, y, config, error, ledger=.false.)
       if (.not. allocated(error)) call modes_at_start(motion, config, .false., .false., .true., model, modes, error)
       if (allocated(error)) return
       call check(error, modes%n, 15, 'modes')
@@ -257,7 +245,7 @@ contains
       config%chain%node_mass = 0.7_wp
       omega = sqrt(300.0_wp/inertia)
       config%chain%hinge_damping = 2.0_wp*0.03_wp*omega*inertia
-      call new_case_motion(config, motion, y, error)
+      call motion_of(motion, y, config, error, ledger=.false.)
       if (.not. allocated(error)) call modes_of(motion, y, modes, error)
       if (allocated(error)) return
       call check_close(error, [modes%frequency(), modes%damping_ratio()], [omega, 0.03_wp], rounding*omega, 'underdamped')
@@ -265,7 +253,7 @@ contains
       call check_close(error, abs(modes%shape(1, 1)), 1.0_wp/sqrt(inertia), rounding, 'normalisation')
       if (allocated(error)) return
       config%chain%hinge_damping = 2.0_wp*1.25_wp*omega*inertia
-      call new_case_motion(config, motion, y, error)
+      call motion_of(motion, y, config, error, ledger=.false.)
       if (.not. allocated(error)) call modes_of(motion, y, modes, error)
       if (allocated(error)) return
       d = sqrt(1.25_wp**2 - 1.0_wp)
@@ -282,7 +270,7 @@ contains
       real(wp) :: half, root
 
       call rigid_chain(config, 2)
-      call new_case_motion(config, motion, y, error)
+      call motion_of(motion, y, config, error, ledger=.false.)
       if (.not. allocated(error)) call modes_of(motion, y, modes, error)
       if (allocated(error)) return
       ! (7/36) z^2 - 3 z + 1 = 0, z = w^2 m l^3/C
@@ -309,7 +297,7 @@ contains
          config%spacecraft%inertia = 1.0e9_wp
          config%spacecraft%hinge_x = 0.8_wp
          config%initial%omega = spin
-         call new_case_motion(config, motion, y, error)
+         call motion_of(motion, y, config, error, ledger=.false.)
          if (.not. allocated(error)) call modes_of(motion, y, modes, error)
          if (allocated(error)) return
          call check(error, modes%n, 4, 'modes')
@@ -339,13 +327,13 @@ contains
       config%loads(1)%node = 1
       config%loads(1)%component = 'X'
       config%loads(1)%value = -75.0_wp
-      call new_case_motion(config, motion, y, error)
+      call motion_of(motion, y, config, error, ledger=.false.)
       if (.not. allocated(error)) call modes_of(motion, y, modes, error)
       if (allocated(error)) return
       call check_close(error, modes%eigenvalue(1)%im, sqrt(150.0_wp/4.0_wp), 10*rounding, 'half the load')
       if (allocated(error)) return
       config%loads(1)%value = -225.0_wp
-      call new_case_motion(config, motion, y, error)
+      call motion_of(motion, y, config, error, ledger=.false.)
       if (.not. allocated(error)) call modes_of(motion, y, modes, error)
       if (allocated(error)) return
       associate (decay => minloc(modes%eigenvalue%re, 1), growth => maxloc(modes%eigenvalue%re, 1))
@@ -384,7 +372,7 @@ contains
       config%chain%hinge_stiffness = [200.0_wp, 100.0_wp]
       config%chain%hinge_damping = [1.0_wp, 0.5_wp]
       config%initial%omega = 3.0_wp
-      call new_case_motion(config, motion, y, error)
+      call motion_of(motion, y, config, error, ledger=.false.)
       if (.not. allocated(error)) call find_equilibrium(motion, 0.0_wp, y, error)
       if (.not. allocated(error)) call new_linear_model(model, motion, 0.0_wp, y, error)
       if (.not. allocated(error)) call new_modes(modes, model, .true., error)
@@ -429,7 +417,7 @@ contains
          call rigid_chain(config, 4)
          config%chain%hinge_stiffness([1, 3]) = 0.0_wp
          config%chain%hinge_damping(1) = real(damped, wp)
-         call new_case_motion(config, motion, y, error)
+         call motion_of(motion, y, config, error, ledger=.false.)
          if (.not. allocated(error)) call modes_of(motion, y, modes, error)
          if (allocated(error)) return
          call check(error, count(modes%kind == mechanism), 2, 'mechanisms')
@@ -442,6 +430,42 @@ contains
    end subroutine free_hinges
 
    !> Kinks fold a chain at rest; on a turning spacecraft with the hinge off its axis the right-hand side is zero.
+   subroutine later_kink(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+      type(mode_set) :: straight, later, early
+
+      call rigid_chain(config, 2)
+      config%chain%kink(:) = [0.5_wp, -0.2_wp]
+      config%initial%phi = [0.5_wp, 1.5_wp] ! bent, so that what accelerates it matters
+      config%t_end = 10.0_wp
+      call find(straight)
+      allocate (config%kink_programs(1))
+      config%kink_programs(1) = kink_config(hinge=1, t_start=1.0_wp, t_end=2.0_wp, value=0.5_wp)
+      if (.not. allocated(error)) call find(later)
+      config%kink_programs(1)%t_start = -2.0_wp
+      config%kink_programs(1)%t_end = -1.0_wp
+      if (.not. allocated(error)) call find(early)
+      if (allocated(error)) return
+      call check(error, maxval(abs(later%eigenvalue - straight%eigenvalue)) <= 0.0_wp, 'a kink acts before it is there')
+      if (allocated(error)) return
+      call check(error, maxval(abs(early%eigenvalue - straight%eigenvalue)) > 1.0e-3_wp, 'a kink that is there does not act')
+
+   contains
+
+      subroutine find(modes)
+         type(mode_set), intent(out) :: modes
+         type(scene_type) :: scene
+         type(motion_type) :: motion
+         type(linear_model) :: model
+
+         call new_scene(scene, config, error)
+         if (.not. allocated(error)) call new_motion(motion, scene, .false., error)
+         if (.not. allocated(error)) call modes_at_start(motion, config, .false., .false., .false., model, modes, error)
+      end subroutine find
+
+   end subroutine later_kink
+
    subroutine equilibria(error)
       type(error_type), allocatable, intent(out) :: error
       type(case_config) :: config
@@ -452,7 +476,7 @@ contains
 
       call rigid_chain(config, 3)
       config%chain%kink(:) = [0.5_wp, -0.2_wp, 0.9_wp]
-      call new_case_motion(config, motion, y, error)
+      call motion_of(motion, y, config, error, ledger=.false.)
       if (.not. allocated(error)) call find_equilibrium(motion, 0.0_wp, y, error)
       if (allocated(error)) return
       call check_close(error, y(:3), [0.5_wp, 0.3_wp, 1.2_wp], rounding, 'kinks')
@@ -465,7 +489,7 @@ contains
          config%chain%hinge_stiffness = config%chain%hinge_stiffness + 500.0_wp
          config%initial%phi = 0.0_wp
          config%initial%omega = 1.0_wp
-         call new_case_motion(config, motion, y, error)
+         call motion_of(motion, y, config, error, ledger=.false.)
          if (.not. allocated(error)) call find_equilibrium(motion, 0.0_wp, y, error)
          if (allocated(error)) return
          allocate (rate(size(y)))
@@ -493,7 +517,7 @@ contains
       deallocate (config%loads)
       allocate (config%loads(1))
       config%loads(1)%value = 1.0_wp
-      call new_case_motion(config, motion, y, error)
+      call motion_of(motion, y, config, error, ledger=.false.)
       if (allocated(error)) return
       call find_equilibrium(motion, 0.0_wp, y, refusal)
       call check(error, allocated(refusal), 'accepted')

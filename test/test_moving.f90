@@ -1,13 +1,14 @@
 !> Moving scenes: driven kinks, laws of hinges, events, locks.
 module test_moving
    use rodyn_kinds, only: wp
-   use rodyn_errors, only: error_type, raise
+   use rodyn_errors, only: error_type
    use rodyn_case_config, only: case_config, hinge_config, kink_config, load_config
    use rodyn_loads, only: load_value
    use rodyn_kink_program, only: kink_set, kink_regime, new_kink_set, new_kink_regime, evaluate_kinks
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_motion, only: motion_type, new_motion, initial_state
    use rodyn_user_load, only: user_load
+   use test_motions, only: check_jacobian
    use test_random_scenes, only: allocate_case, random_case, seed_random, kind_name, n_kinds
    use test_testing, only: unittest, new_test, check, check_close
    use test_trajectories, only: trajectory, integrate
@@ -548,10 +549,8 @@ contains
       type(case_config) :: config
       type(scene_type) :: scene
       type(motion_type) :: motion
-      real(wp), allocatable :: y(:), jac(:, :), plus(:), minus(:), yp(:), ym(:), column(:)
-      real(wp) :: step
-      logical :: ok
-      integer :: which, j
+      real(wp), allocatable :: y(:)
+      integer :: which
 
       call seed_random(8)
       do which = 1, n_kinds
@@ -564,24 +563,8 @@ contains
          call initial_state(motion, config%initial, y)
          call motion%begin_regime(0.0_wp, 1.0_wp, 1.0_wp, y, error)
          if (allocated(error)) return
-         allocate (jac(size(y), size(y)), plus(size(y)), minus(size(y)))
-         call motion%jacobian(0.3_wp, y, jac, ok)
-         call check(error, ok, 'no Jacobian')
+         call check_jacobian(motion, y, kind_name(which), error)
          if (allocated(error)) return
-         do j = 1, size(y)
-            step = epsilon(1.0_wp)**(1.0_wp/3.0_wp)*max(1.0_wp, abs(y(j)))
-            yp = y
-            ym = y
-            yp(j) = y(j) + step
-            ym(j) = y(j) - step
-            call motion%rhs(0.3_wp, yp, plus, ok)
-            call motion%rhs(0.3_wp, ym, minus, ok)
-            column = (plus - minus)/(yp(j) - ym(j))
-            ! Truncation of central differences: step^2 relative, with margin for third derivatives.
-            call check(error, maxval(abs(jac(:, j) - column)) < 1.0e-7_wp*maxval(abs(jac)), kind_name(which)//': Jacobian is off')
-            if (allocated(error)) return
-         end do
-         deallocate (jac, plus, minus)
       end do
    end subroutine test_jacobian
 

@@ -1,11 +1,12 @@
 !> Run files: layout, blocks, temporary and final names.
 module test_run_file
+   use, intrinsic :: ieee_arithmetic, only: ieee_positive_inf, ieee_value
    use, intrinsic :: iso_fortran_env, only: int64
    use rodyn_errors, only: error_type, exit_bad_input
    use rodyn_hdf5_files, only: hdf5_file
    use rodyn_kinds, only: i8, wp
    use rodyn_posix, only: path_exists
-   use rodyn_run_file, only: check_output_path, new_run_row, run_file, run_header, run_row, solver_report
+   use rodyn_run_file, only: check_output_path, is_finite, new_run_row, run_file, run_header, run_row, solver_report
    use rodyn_run_layout, only: n_run_variables, run_variables
    use test_scratch, only: clean, scratch_path
    use test_testing, only: check, check_close, new_test, unittest
@@ -32,7 +33,8 @@ contains
          new_test('an existing result is replaced when forced', test_forced), &
          new_test('a result that appears meanwhile is left alone', test_race), &
          new_test('a missing directory and a directory as file are refused', test_bad_paths), &
-         new_test('a run file is used after finish only with an error', test_closed)]
+         new_test('a run file is used after finish only with an error', test_closed), &
+         new_test('an infinite number of any rod is found', test_finite)]
    end subroutine collect_run_file
 
    !> A file of made-up rows: entry i of data set k at row r is value(k, i, r).
@@ -403,5 +405,31 @@ contains
       call run%finish('done', sample_report(), refusal)
       call check(error, allocated(refusal), 'nothing was finished')
    end subroutine test_closed
+
+   subroutine test_finite(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(run_row), target :: row
+      real(wp) :: infinite
+      logical :: found(8)
+
+      infinite = ieee_value(1.0_wp, ieee_positive_inf)
+      row = new_run_row(2)
+      call check(error, is_finite(row), 'a row of zeros is not finite')
+      if (allocated(error)) return
+      found = [seen(row%phi), seen(row%alpha), seen(row%beta), seen(row%bubble), seen(row%phi_rate), seen(row%alpha_rate), &
+               seen(row%beta_rate), seen(row%bubble_rate)]
+      call check(error, all(found), 'not seen')
+
+   contains
+
+      !> Is it found in this part of the row?
+      logical function seen(x)
+         real(wp), target, intent(inout) :: x(:)
+         x(2) = infinite
+         seen = .not. is_finite(row)
+         x(2) = 0.0_wp
+      end function seen
+
+   end subroutine test_finite
 
 end module test_run_file

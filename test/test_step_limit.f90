@@ -2,7 +2,6 @@
 module test_step_limit
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type, exit_bad_input
-   use rodyn_ode, only: ode_system
    use rodyn_case_config, only: case_config
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_motion, only: motion_type, new_motion, initial_state, state_invariants
@@ -13,20 +12,18 @@ module test_step_limit
    use rodyn_integrators, only: new_integrator
    use rodyn_stability_function, only: stability_function, stability_function_of
    use rodyn_step_limit, only: check_fixed_step, growth_in_run, largest_stable_step
+   use test_oscillators, only: oscillator, new_oscillator
    use test_random_scenes, only: random_case, seed_random, n_kinds, kind_name
    use test_testing, only: unittest, new_test, check, check_close
    implicit none (type, external)
    private
    public :: collect_step_limit
 
-   !> x'' = -w^2 x - d x'.
-   type, extends(ode_system) :: oscillator
-      real(wp) :: frequency = 1.0_wp !! w [rad/s]
-      real(wp) :: damping = 0.0_wp   !! d [1/s]
+   !> Refuses states that an unstable method has blown up, before they overflow.
+   type, extends(oscillator) :: bounded_oscillator
    contains
-      procedure :: rhs
-      procedure :: jacobian
-   end type oscillator
+      procedure :: rhs => bounded_rhs
+   end type bounded_oscillator
 
    !> The explicit methods, by name and order.
    character(len=6), parameter :: methods(8) = [character(len=6) :: 'erk', 'erk', 'erk', 'erk', 'erk', 'erk', 'erk', 'dop853']
@@ -45,32 +42,21 @@ contains
          new_test('eigenvalues of random scenes at rest are their natural frequencies', undamped_eigenvalues), &
          new_test('the fastest vibration and damper of a long chain, from below and to a hundredth', extreme_rates), &
          new_test('a scene keeps its energy below the limit of each method and explodes above it', scene_limits), &
-         new_test('a refused step is named with a limit that is accepted', refusals)]
+         new_test('a refused step is named with a limit that is accepted', refusals), &
+         new_test('steps that moving kinks make shorter are not refused', shortened_steps), &
+         new_test('eigenvalues are those of the loads and kinks at the start', eigenvalues_at_start)]
    end subroutine collect_step_limit
 
-   subroutine rhs(self, t, y, ydot, ok)
-      class(oscillator), intent(inout) :: self
+   subroutine bounded_rhs(self, t, y, ydot, ok)
+      class(bounded_oscillator), intent(inout) :: self
       real(wp), intent(in) :: t
       real(wp), contiguous, intent(in) :: y(:)
       real(wp), contiguous, intent(out) :: ydot(:)
       logical, intent(out) :: ok
-      ok = t < huge(t) .and. all(abs(y) < 1.0e100_wp)
+      ok = all(abs(y) < 1.0e100_wp)
       ydot = 0.0_wp
-      if (.not. ok) return
-      ydot(1) = y(2)
-      ydot(2) = -self%frequency**2*y(1) - self%damping*y(2)
-   end subroutine rhs
-
-   subroutine jacobian(self, t, y, jac, ok)
-      class(oscillator), intent(inout) :: self
-      real(wp), intent(in) :: t
-      real(wp), contiguous, intent(in) :: y(:)
-      real(wp), contiguous, intent(out) :: jac(:, :)
-      logical, intent(out) :: ok
-      ok = t < huge(t)
-      jac(:, 1) = [0.0_wp, -self%frequency**2]
-      jac(:, 2) = [1.0_wp, -self%damping] + 0.0_wp*y
-   end subroutine jacobian
+      if (ok) call self%oscillator%rhs(t, y, ydot, ok)
+   end subroutine bounded_rhs
 
    subroutine exponential_series(error)
       type(error_type), allocatable, intent(out) :: error
@@ -155,16 +141,14 @@ contains
       real(wp) function final_size(which, step)
          integer, intent(in) :: which
          real(wp), intent(in) :: step
-         type(oscillator), target :: system
+         type(bounded_oscillator), target :: system
          type(solver_options) :: options
          class(integrator_type), allocatable :: integrator
          type(error_type), allocatable :: failure
          real(wp) :: y(2), t
 
-         system%frequency = frequency
+         system%oscillator = new_oscillator(frequency, .false.)
          system%damping = damping
-         system%n_states = 2
-         system%n_controlled = 2
          options%order = orders(which)
          options%fixed_step = step
          y = [1.0_wp, 0.0_wp]
@@ -201,7 +185,7 @@ contains
          y(scene%phi_at() + 1:scene%phi_at() + 3) = config%initial%phi
          call natural_frequencies(scene, y(:scene%n_dof), frequency, error)
          if (allocated(error)) return
-         call all_eigenvalues(scene, y, lambda)
+         call all_eigenvalues(scene, y, 1.0_wp, lambda)
          call check(error, size(lambda), 2*scene%n_dof, 'eigenvalues found')
          if (allocated(error)) return
          do i = 1, size(frequency)
@@ -279,7 +263,7 @@ contains
       call initial_state(motion, config%initial, y)
       y(:motion%n_q) = 0.0_wp
       y = 1.0e-6_wp*y
-      call all_eigenvalues(scene, y, lambda)
+      call all_eigenvalues(scene, y, 1.0_wp, lambda)
       t_end = 2000.0_wp/maxval(abs(lambda))
       do i = 1, size(methods)
          call stability_function_of(r, trim(methods(i)), orders(i), error)
@@ -372,5 +356,104 @@ contains
          if (allocated(error)) return
       end do
    end subroutine refusals
+
+   !> Half as long again as the limit, but a table's knots end the steps at 0.9 of it.
+   subroutine shortened_steps(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+      real(wp) :: limit
+      integer, parameter :: n = 100
+      integer :: i
+
+      call seed_random(45)
+      call random_case(config, 1, 3)
+      config%t_end = 10.0_wp
+      limit = limit_of(1.0_wp)
+      config%t_end = 0.9_wp*n*limit
+      call check(error, limit_of(1.5_wp*limit) < huge(limit), 'a step above the limit is accepted')
+      if (allocated(error)) return
+      allocate (config%kink_programs(1))
+      config%kink_programs(1)%law = 'table'
+      config%kink_programs(1)%times = [(config%t_end*(real(i, wp)/n), i=0, n)]
+      config%kink_programs(1)%values = [(0.0_wp, i=0, n)]
+      call check(error, limit_of(1.5_wp*limit) >= huge(limit), 'shorter steps are refused')
+
+   contains
+
+      !> The limit that a refusal names; huge if the step is accepted.
+      real(wp) function limit_of(step)
+         real(wp), intent(in) :: step
+         type(scene_type) :: scene
+         type(motion_type) :: motion
+         type(error_type), allocatable :: refusal
+         real(wp), allocatable :: y(:)
+         character(len=*), parameter :: words = 'with steps above '
+
+         limit_of = 0.0_wp
+         call new_scene(scene, config, refusal)
+         if (.not. allocated(refusal)) call new_motion(motion, scene, .false., refusal)
+         if (allocated(refusal)) return
+         call initial_state(motion, config%initial, y)
+         call check_fixed_step('dop853', solver_options(fixed_step=step), scene, y, config%t_end, refusal)
+         limit_of = huge(limit_of)
+         if (.not. allocated(refusal)) return
+         read (refusal%message(index(refusal%message, words) + len(words):), *) limit_of
+      end function limit_of
+
+   end subroutine shortened_steps
+
+   !> A kink that bends the chain later is no kink yet; a load that acts to the end of the run acts.
+   subroutine eigenvalues_at_start(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+      complex(wp), allocatable :: straight(:, :), later(:, :), early(:, :), loaded(:, :), for_ever(:, :)
+
+      call seed_random(46)
+      call random_case(config, 1, 3)
+      config%t_end = 10.0_wp
+      config%loads = config%loads(:0)
+      straight = eigenvalues()
+      allocate (config%kink_programs(1))
+      config%kink_programs(1)%t_start = 1.0_wp
+      config%kink_programs(1)%t_end = 2.0_wp
+      config%kink_programs(1)%value = 0.5_wp
+      later = eigenvalues()
+      call check(error, maxval(abs(later - straight)) <= 0.0_wp, 'a kink acts before it is there')
+      if (allocated(error)) return
+      config%kink_programs(1)%t_start = -2.0_wp
+      config%kink_programs(1)%t_end = -1.0_wp
+      early = eigenvalues()
+      call check(error, maxval(abs(early - straight)) > 1.0e-3_wp, 'a kink that is there does not act')
+      if (allocated(error)) return
+      deallocate (config%kink_programs)
+      deallocate (config%loads)
+      allocate (config%loads(1))
+      config%loads(1)%component = 'X'
+      config%loads(1)%value = 1000.0_wp
+      for_ever = eigenvalues()
+      call check(error, maxval(abs(for_ever - straight)) > 1.0e-3_wp, 'a load does not act')
+      if (allocated(error)) return
+      config%loads(1)%t_end = config%t_end
+      loaded = eigenvalues()
+      call check(error, maxval(abs(loaded - for_ever)) <= 0.0_wp, 'a load to the end of the run does not act')
+
+   contains
+
+      function eigenvalues() result(lambda)
+         complex(wp), allocatable :: lambda(:, :)
+         type(scene_type) :: scene
+         type(motion_type) :: motion
+         type(error_type), allocatable :: failure
+         real(wp), allocatable :: y(:)
+
+         allocate (lambda(1, 0))
+         call new_scene(scene, config, failure)
+         if (.not. allocated(failure)) call new_motion(motion, scene, .false., failure)
+         if (allocated(failure)) return
+         call initial_state(motion, config%initial, y)
+         call all_eigenvalues(scene, y, config%t_end, lambda)
+      end function eigenvalues
+
+   end subroutine eigenvalues_at_start
 
 end module test_step_limit

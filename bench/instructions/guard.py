@@ -45,6 +45,7 @@ def command_output(*command: str, **environment: str) -> str:
 def build(prefix: str) -> str:
     """Build the benchmark for x86-64-v3; return its path."""
     compiler = os.environ.get("FPM_FC", "mpifort")
+    command_output("tools/stamp_commit")
     path = f"{ROOT / '.venv' / 'bin'}:{os.environ['PATH']}"
     flags = command_output("tools/flags", "release", RODYN_MARCH="x86-64-v3").strip()
     command_output("fpm", "build", "--flag", flags, FPM_FC=compiler, PATH=path)

@@ -85,7 +85,7 @@ def test_where_there_is_no_equilibrium_that_is_said(tmp_path):
     assert not (tmp_path / "case_modes.h5").exists()
     write_case(tmp_path, FIXED + KINKED + "&load target = 'node', node = 1, component = 'Y', law = 'sine_squared', value = 1, rate = 1 /\n")
     result = rodyn("modes", "case.nml", "--equilibrium", cwd=tmp_path)
-    assert result.returncode == 1 and "a load varies in time" in result.stderr
+    assert result.returncode == 1 and "a load or a kink varies in time" in result.stderr
 
 
 def test_loads_act_on_request(tmp_path):
@@ -131,3 +131,20 @@ def test_the_picture_swings_as_far_as_it_is_told(tmp_path):
         np.testing.assert_allclose(ahead.nodes + behind.nodes, 2 * still.nodes, atol=1e-2 * reach)
     with pytest.raises(DataError, match="no mode 99"):
         mode_shapes.plot(tmp_path / "case_modes.h5", tmp_path / "x.png", modes=[99])
+
+
+def test_bubbles_of_modes_are_drawn(tmp_path):
+    """One clamped rod: where its curve stands at a quarter and in the middle, by the three shapes."""
+    chain = "&chain n_rods = 1, length = 2.0, mass_per_length = 1.5, bending_stiffness = 100.0, hinge_stiffness = 1e4 /\n"
+    data = modes_of(tmp_path, "&case t_end = 1 /\n&spacecraft motion = 'fixed' /\n" + chain + "&model bending_shapes = 3, gauss_points = 5 /\n")
+    second = int(np.flatnonzero(data.kind.values == "oscillation")[1])
+    alpha, beta, bubble = (data[f"{name}_real"].values[second, 0] for name in ("alpha", "beta", "bubble"))
+    middle = 2.0 * (alpha - beta) / 8 + bubble
+    quarter = 2.0 * (9 * alpha - 3 * beta) / 64 + 9 / 16 * bubble
+    with mode_shapes.open_modes(tmp_path / "case_modes.h5") as found:
+        _, ahead, *_ = mode_shapes.swing(found, second, 1e-3, "moving")
+    (start, end), curve = ahead.nodes, ahead.rods[0]
+    across = np.array([start[1] - end[1], end[0] - start[0]]) / 2.0
+    at_quarter, at_middle = ((curve[i] - start) @ across for i in (5, 10))
+    assert abs(bubble) > 0.1 * abs(middle)
+    assert np.isclose(at_quarter / at_middle, quarter / middle, rtol=1e-9)

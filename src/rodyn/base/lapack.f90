@@ -1,12 +1,13 @@
 !> The LAPACK and BLAS routines in use, with their interfaces; the only module that names them.
 module rodyn_lapack
    use rodyn_kinds, only: wp
+   use rodyn_errors, only: error_type, raise
    use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_procpointer, c_funptr, c_int, c_null_char, c_null_ptr, &
       c_ptr
    implicit none (type, external)
    private
-   public :: use_one_thread
-   public :: dpotrf, dpotrs, dgesv, dgetrf, dgetrs, dsygvd, dsyev, dgeev, dgemv, dgemm
+   public :: use_one_thread, symmetric_eigenvalues
+   public :: dpotrf, dpotrs, dgesv, dgetrf, dgetrs, dsyev, dgeev, dgemv, dgemm
 
    interface
       !> Cholesky factors of a symmetric positive definite matrix.
@@ -124,6 +125,28 @@ module rodyn_lapack
    end interface
 
 contains
+
+   !> Eigenvalues of A x = lambda M x, rising, A symmetric and M positive definite; the lower triangles are read, both are
+   !> overwritten, A by the vectors if they are wanted, x^T M x = 1.
+   subroutine symmetric_eigenvalues(a, m, values, with_vectors, error)
+      real(wp), contiguous, intent(inout) :: a(:, :), m(:, :) !! (n, n)
+      real(wp), allocatable, intent(out) :: values(:)         !! (n)
+      logical, intent(in) :: with_vectors
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: work(:)
+      integer, allocatable :: integer_work(:)
+      real(wp) :: work_size(1)
+      character(len=1) :: job
+      integer :: info, n, integer_size(1)
+
+      n = size(a, 1)
+      job = merge('V', 'N', with_vectors)
+      allocate (values(n))
+      call dsygvd(1, job, 'L', n, a, n, m, n, values, work_size, -1, integer_size, -1, info)
+      allocate (work(int(work_size(1))), integer_work(integer_size(1)))
+      call dsygvd(1, job, 'L', n, a, n, m, n, values, work, size(work), integer_work, size(integer_work), info)
+      if (info /= 0) call raise(error, 'dsygvd: no eigenvalues (mass matrix not positive definite, or no convergence)')
+   end subroutine symmetric_eigenvalues
 
    !> Have the library compute in the calling thread. OpenBLAS would start one per core for the smallest matrix, and
    !> the processes of a sweep have a core each already. Other libraries are left as they are.

@@ -5,7 +5,7 @@ module rodyn_text
    implicit none (type, external)
    private
    public :: lower, is_name, is_digit
-   public :: to_text, quoted, printable, ends_with
+   public :: to_text, short_text, quoted, printable, ends_with
    public :: edit_distance, word_count, word
 
    !> A number as the shortest text (integer), or with 17 significant digits (real), or as T or F.
@@ -164,5 +164,15 @@ contains
       ends_with = n > len(ending)
       if (ends_with) ends_with = text(n - len(ending) + 1:n) == ending
    end function ends_with
+
+   !> A number for a message, six significant digits.
+   pure function short_text(x) result(text)
+      real(wp), intent(in) :: x
+      character(len=:), allocatable :: text
+      character(len=16) :: digits
+      write (digits, '(g0.6)') x
+      text = trim(adjustl(digits))
+      if (text(1:1) == '.') text = '0'//text ! which some compilers leave out
+   end function short_text
 
 end module rodyn_text

@@ -39,7 +39,7 @@ contains
       integer :: i
 
       if (motion%dynamics%varying) then
-         call raise(error, 'no equilibrium: a load varies in time')
+         call raise(error, 'no equilibrium: a load or a kink varies in time')
          return
       end if
       associate (b => motion%dynamics%scene%n_base, r => motion%n_q, m => motion%n_dof)

@@ -3,7 +3,8 @@
 !>
 !> M^-1 K is symmetric in the inner product of K, x.K y; Lanczos' tridiagonal matrix then has an eigenvalue that is never above
 !> the largest of M^-1 K and soon within a thousandth of it (Golub & Van Loan, Matrix Computations, sec. 10.1). The same
-!> holds for D.
+!> holds for D. Symmetry needs springs without moments and the tangent in closed form; the estimate that a choice of method is
+!> content with does without either (`rodyn_fastest_rates`).
 module rodyn_fast_eigenvalues
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
@@ -27,22 +28,24 @@ contains
 
    !> Eigenvalues lambda(i, j) [1/s] of y' = f(t, y) at t = 0: for each j, one of lambda(:, j) is an eigenvalue, or near
    !> one. None if the equations cannot be evaluated.
-   subroutine fast_eigenvalues(scene, y, lambda)
+   subroutine fast_eigenvalues(scene, y, t_end, lambda)
       type(scene_type), intent(in) :: scene
       real(wp), contiguous, intent(in) :: y(:) !! state at t = 0; quadratures behind it do not matter
+      real(wp), intent(in) :: t_end            !! end of the run [s]
       complex(wp), allocatable, intent(out) :: lambda(:, :)
 
       if (scene%n_q + scene%n_dof <= most_states) then
-         call all_eigenvalues(scene, y(:scene%n_q + scene%n_dof), lambda)
+         call all_eigenvalues(scene, y(:scene%n_q + scene%n_dof), t_end, lambda)
       else
          call extreme_eigenvalues(scene, y(:scene%n_q), lambda)
       end if
    end subroutine fast_eigenvalues
 
-   !> By LAPACK, with what loads, turning and dampers do.
-   subroutine all_eigenvalues(scene, y, lambda)
+   !> By LAPACK, with what loads, kinks, turning and dampers do.
+   subroutine all_eigenvalues(scene, y, t_end, lambda)
       type(scene_type), intent(in) :: scene
       real(wp), contiguous, intent(in) :: y(:) !! (n_q + n_dof)
+      real(wp), intent(in) :: t_end            !! end of the run [s]
       complex(wp), allocatable, intent(out) :: lambda(:, :) !! (1, n_q + n_dof)
       type(motion_type) :: motion
       type(error_type), allocatable :: error
@@ -55,7 +58,7 @@ contains
       allocate (lambda(1, 0))
       call new_motion(motion, scene, .false., error)
       if (allocated(error)) return
-      call motion%dynamics%set_regime(0.0_wp, minval([huge(1.0_wp), pack(scene%loads%switches, scene%loads%switches > 0.0_wp)]))
+      call motion%dynamics%set_regime(0.0_wp, minval([scene%switches, t_end]))
       call motion%jacobian(0.0_wp, y, jacobian, ok)
       if (.not. ok .or. .not. all(abs(jacobian) <= huge(1.0_wp))) return
       call dgeev('N', 'N', size(y), jacobian, size(y), re, im, none, 1, none, 1, work, size(work), info)

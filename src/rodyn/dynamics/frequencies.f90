@@ -3,11 +3,11 @@
 !> (`rodyn_locks`).
 module rodyn_frequencies
    use rodyn_kinds, only: wp
-   use rodyn_errors, only: error_type, raise
+   use rodyn_errors, only: error_type
    use rodyn_scene, only: scene_type
    use rodyn_assembled, only: assembled_system, new_assembled_system, mass_matrix
    use rodyn_locks, only: has_slaves, free_coordinates, reduce_matrix
-   use rodyn_lapack, only: dsygvd
+   use rodyn_lapack, only: symmetric_eigenvalues
    implicit none (type, external)
    private
    public :: natural_frequencies, decay_rates
@@ -51,12 +51,10 @@ contains
       real(wp), intent(in) :: a(:, :)
       real(wp), allocatable, intent(out) :: value(:)
       type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: work(:), matrix(:, :), mass(:, :)
-      integer, allocatable :: integer_work(:), free(:)
-      real(wp) :: sine(0:scene%n), cosine(0:scene%n), work_size(1)
-      integer :: info, m, integer_size(1)
+      real(wp), allocatable :: matrix(:, :), mass(:, :)
+      integer, allocatable :: free(:)
+      real(wp) :: sine(0:scene%n), cosine(0:scene%n)
 
-      m = scene%n_dof
       matrix = a
       sine(0) = 0.0_wp
       cosine(0) = 1.0_wp
@@ -70,13 +68,8 @@ contains
          free = free_coordinates(scene)
          mass = mass(free, free)
          matrix = matrix(free, free)
-         m = size(free)
       end if
-      allocate (value(m))
-      call dsygvd(1, 'N', 'L', m, matrix, m, mass, m, value, work_size, -1, integer_size, -1, info)
-      allocate (work(int(work_size(1))), integer_work(integer_size(1)))
-      call dsygvd(1, 'N', 'L', m, matrix, m, mass, m, value, work, size(work), integer_work, size(integer_work), info)
-      if (info /= 0) call raise(error, 'dsygvd: no eigenvalues (mass matrix not positive definite, or no convergence)')
+      call symmetric_eigenvalues(matrix, mass, value, .false., error)
    end subroutine eigenvalues
 
 end module rodyn_frequencies

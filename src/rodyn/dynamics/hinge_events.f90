@@ -21,13 +21,15 @@ module rodyn_hinge_events
    integer, parameter :: crowd = 32          !! events of one hinge in no time are chatter
    real(wp), parameter :: no_time = 1.0e-8_wp !! of the simulated time
 
+   !> Something that a hinge did.
    type :: hinge_event
       real(wp) :: time = 0.0_wp !! [s]
-      integer :: hinge = 0
+      integer :: hinge = 0      !! 0..n-1
       integer :: kind = 0       !! of `kind_names`
       real(wp) :: energy_lost = 0.0_wp !! [J]
    end type hinge_event
 
+   !> What is watched, and what has happened.
    type :: event_set
       logical :: watches = .false.      !! some hinge has a mechanism
       integer :: n = 0                  !! margins
@@ -70,6 +72,7 @@ contains
                 events%moment_rate(0:law%n), source=0.0_wp)
    end subroutine new_event_set
 
+   !> Does the mechanism have this part?
    pure logical function has_part(mechanism, part)
       type(hinge_mechanism), intent(in) :: mechanism
       integer, intent(in) :: part
@@ -108,11 +111,20 @@ contains
 
       call find_joints(self, dynamics, t, q, p)
       do i = 1, self%n
-         associate (mechanism => dynamics%scene%hinges%mechanisms(self%mechanism(i)))
-            margin(i) = mechanism%margin(self%part(i), t, self%theta(mechanism%hinge), self%theta_rate(mechanism%hinge))
-         end associate
+         margin(i) = margin_of(self, dynamics, i, t)
       end do
    end subroutine margins
+
+   !> One margin at a time and the joints of the workspace.
+   pure real(wp) function margin_of(self, dynamics, i, t)
+      class(event_set), intent(in) :: self
+      type(dynamics_type), intent(in) :: dynamics
+      integer, intent(in) :: i !! margin
+      real(wp), intent(in) :: t
+      associate (mechanism => dynamics%scene%hinges%mechanisms(self%mechanism(i)))
+         margin_of = mechanism%margin(self%part(i), t, self%theta(mechanism%hinge), self%theta_rate(mechanism%hinge))
+      end associate
+   end function margin_of
 
    !> Locks and laws at the start.
    subroutine begin(self, dynamics, q, p, error)
@@ -159,16 +171,28 @@ contains
       call find_joints(self, dynamics, t, q, p)
       do i = 1, self%n
          if (.not. crossed(i)) cycle
-         if (self%part(i) == part_latch) then
-            call latch(self, dynamics, self%mechanism(i), t, q, p, lost, error)
-         else
-            call change_law(self, dynamics, i, t, lost, error)
-         end if
+         call change_part(self, dynamics, i, t, q, p, lost, error)
          if (allocated(error)) return
       end do
       call dynamics%change_hinges()
       call self%settle(dynamics, t, q, p, lost, error)
    end subroutine respond
+
+   !> What follows when a margin has become negative.
+   subroutine change_part(self, dynamics, i, t, q, p, lost, error)
+      class(event_set), intent(inout) :: self
+      type(dynamics_type), intent(inout) :: dynamics
+      integer, intent(in) :: i !! margin
+      real(wp), intent(in) :: t, q(:)
+      real(wp), intent(inout) :: p(:)
+      real(wp), intent(inout) :: lost
+      type(error_type), allocatable, intent(inout) :: error
+      if (self%part(i) == part_latch) then
+         call latch(self, dynamics, self%mechanism(i), t, q, p, lost, error)
+      else
+         call change_law(self, dynamics, i, t, lost, error)
+      end if
+   end subroutine change_part
 
    !> Take the other law of one part.
    subroutine change_law(self, dynamics, i, t, lost, error)
@@ -199,7 +223,7 @@ contains
       type(error_type), allocatable, intent(inout) :: error
       real(wp) :: lost_here, worked
       logical :: ok
-      integer :: i, hinge
+      integer :: hinge
 
       lost_here = 0.0_wp
       hinge = dynamics%scene%hinges%mechanisms(which)%hinge
@@ -215,15 +239,29 @@ contains
       end if
       lost = lost + lost_here
       call self%note(t, hinge, kind_latched, lost_here, error)
-      do i = 1, size(dynamics%scene%hinges%mechanisms)
-         associate (other => dynamics%scene%hinges%mechanisms(i))
-            if (.not. other%locked .or. other%release_after /= hinge .or. allocated(error)) cycle
-            call other%release(self%theta(other%hinge), lost_here)
+      call release(self, dynamics, dynamics%scene%hinges%mechanisms%release_after == hinge, t, lost, error)
+   end subroutine latch
+
+   !> Release those of some hinges that are locked.
+   subroutine release(self, dynamics, due, t, lost, error)
+      class(event_set), intent(inout) :: self
+      type(dynamics_type), intent(inout) :: dynamics
+      logical, intent(in) :: due(:) !! of each mechanism
+      real(wp), intent(in) :: t
+      real(wp), intent(inout) :: lost
+      type(error_type), allocatable, intent(inout) :: error
+      real(wp) :: lost_here
+      integer :: i
+
+      do i = 1, size(due)
+         associate (mechanism => dynamics%scene%hinges%mechanisms(i))
+            if (.not. mechanism%locked .or. .not. due(i) .or. allocated(error)) cycle
+            call mechanism%release(self%theta(mechanism%hinge), lost_here)
             lost = lost + lost_here
-            call self%note(t, other%hinge, kind_released, lost_here, error)
+            call self%note(t, mechanism%hinge, kind_released, lost_here, error)
          end associate
       end do
-   end subroutine latch
+   end subroutine release
 
    !> Release the hinges whose time has come.
    subroutine release_due(self, dynamics, t, q, p, lost, error)
@@ -232,18 +270,9 @@ contains
       real(wp), intent(in) :: t, q(:), p(:)
       real(wp), intent(inout) :: lost
       type(error_type), allocatable, intent(inout) :: error
-      real(wp) :: lost_here
-      integer :: i
 
       call find_joints(self, dynamics, t, q, p)
-      do i = 1, size(dynamics%scene%hinges%mechanisms)
-         associate (mechanism => dynamics%scene%hinges%mechanisms(i))
-            if (.not. mechanism%locked .or. mechanism%release_time > t .or. allocated(error)) cycle
-            call mechanism%release(self%theta(mechanism%hinge), lost_here)
-            lost = lost + lost_here
-            call self%note(t, mechanism%hinge, kind_released, lost_here, error)
-         end associate
-      end do
+      call release(self, dynamics, dynamics%scene%hinges%mechanisms%release_time <= t, t, lost, error)
       call dynamics%change_hinges()
    end subroutine release_due
 
@@ -263,16 +292,9 @@ contains
          call find_joints(self, dynamics, t, q, p)
          changed = .false.
          do i = 1, self%n
-            associate (mechanism => dynamics%scene%hinges%mechanisms(self%mechanism(i)))
-               if (.not. mechanism%margin(self%part(i), t, self%theta(mechanism%hinge), &
-                                          self%theta_rate(mechanism%hinge)) < 0.0_wp) cycle
-            end associate
+            if (.not. margin_of(self, dynamics, i, t) < 0.0_wp) cycle
             changed = .true.
-            if (self%part(i) == part_latch) then
-               call latch(self, dynamics, self%mechanism(i), t, q, p, lost, error)
-            else
-               call change_law(self, dynamics, i, t, lost, error)
-            end if
+            call change_part(self, dynamics, i, t, q, p, lost, error)
             if (allocated(error)) return
          end do
          if (.not. changed) return

@@ -11,7 +11,8 @@
 module rodyn_modes
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type, raise
-   use rodyn_lapack, only: dgeev, dsygvd
+   use rodyn_jacobi_rotation, only: jacobi_rotation, rotate_columns, rotate_rows
+   use rodyn_lapack, only: dgeev, symmetric_eigenvalues
    use rodyn_linear_model, only: linear_model
    implicit none (type, external)
    private
@@ -154,7 +155,7 @@ contains
       reduced%asymmetry = reduced%asymmetry/max(maxval(abs(kc)), tiny(1.0_wp))
       kc = 0.5_wp*(kc + transpose(kc))
       reduced%basis = kc
-      call undamped_modes(reduced%basis, mc, reduced%omega_2, error)
+      call symmetric_eigenvalues(reduced%basis, mc, reduced%omega_2, .true., error)
       if (.not. allocated(error)) call polish_modes(kc, reduced%basis, reduced%omega_2)
    end subroutine reduce
 
@@ -163,12 +164,13 @@ contains
    !> mass and so small x. Rotations by Jacobi make it diagonal, each element to rounding of the two beside it.
    subroutine polish_modes(k, basis, omega_2)
       real(wp), intent(in) :: k(:, :)        !! symmetric
-      real(wp), intent(inout) :: basis(:, :) !! M-orthonormal
+      real(wp), contiguous, intent(inout) :: basis(:, :) !! M-orthonormal
       real(wp), intent(inout) :: omega_2(:)  !! rising
       integer, parameter :: most_sweeps = 20
       real(wp), parameter :: negligible = 10.0_wp*epsilon(1.0_wp)
       real(wp), allocatable :: h(:, :)
       integer, allocatable :: order(:)
+      real(wp) :: c, s
       integer :: i, j, sweep
       logical :: done
 
@@ -180,7 +182,10 @@ contains
                if (abs(h(i, j)) <= negligible*sqrt(abs(h(i, i)))*sqrt(abs(h(j, j)))) cycle
                if (abs(h(i, j)) <= tiny(1.0_wp)) cycle
                done = .false.
-               call rotate(h, basis, i, j)
+               call jacobi_rotation(h, i, j, c, s)
+               call rotate_columns(h, i, j, c, s)
+               call rotate_rows(h, i, j, c, s)
+               call rotate_columns(basis, i, j, c, s)
             end do
          end do
          if (done) exit
@@ -190,50 +195,6 @@ contains
       omega_2 = omega_2(order)
       basis = basis(:, order)
    end subroutine polish_modes
-
-   !> Make h(i, j) zero.
-   pure subroutine rotate(h, basis, i, j)
-      real(wp), intent(inout) :: h(:, :), basis(:, :)
-      integer, intent(in) :: i, j
-      real(wp) :: theta, t, c, s, before
-      integer :: m
-
-      theta = 0.5_wp*(h(j, j) - h(i, i))/h(i, j)
-      t = sign(1.0_wp, theta)/(abs(theta) + hypot(1.0_wp, theta))
-      c = 1.0_wp/hypot(1.0_wp, t)
-      s = t*c
-      do m = 1, size(h, 1)
-         before = h(m, i)
-         h(m, i) = c*before - s*h(m, j)
-         h(m, j) = s*before + c*h(m, j)
-         before = basis(m, i)
-         basis(m, i) = c*before - s*basis(m, j)
-         basis(m, j) = s*before + c*basis(m, j)
-      end do
-      do m = 1, size(h, 1)
-         before = h(i, m)
-         h(i, m) = c*before - s*h(j, m)
-         h(j, m) = s*before + c*h(j, m)
-      end do
-   end subroutine rotate
-
-   !> K x = omega^2 M x: vectors take the place of K.
-   subroutine undamped_modes(k, m, omega_2, error)
-      real(wp), intent(inout) :: k(:, :), m(:, :)
-      real(wp), allocatable, intent(out) :: omega_2(:) !! rising
-      type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: work(:)
-      integer, allocatable :: integer_work(:)
-      real(wp) :: work_size(1)
-      integer :: info, n, integer_size(1)
-
-      n = size(k, 1)
-      allocate (omega_2(n))
-      call dsygvd(1, 'V', 'L', n, k, n, m, n, omega_2, work_size, -1, integer_size, -1, info)
-      allocate (work(int(work_size(1))), integer_work(integer_size(1)))
-      call dsygvd(1, 'V', 'L', n, k, n, m, n, omega_2, work, size(work), integer_work, size(integer_work), info)
-      if (info /= 0) call raise(error, 'dsygvd: no modes (mass matrix not positive definite, or no convergence)')
-   end subroutine undamped_modes
 
    !> The undamped modes are all there is.
    subroutine conservative_modes(modes, model, reduced, with_shapes)

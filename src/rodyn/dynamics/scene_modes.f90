@@ -11,6 +11,7 @@ module rodyn_scene_modes
    use rodyn_scene, only: scene_type
    use rodyn_assembled, only: assembled_system, new_assembled_system, mass_matrix
    use rodyn_locks, only: has_slaves, reduce, expand, reduce_matrix
+   use rodyn_jacobi_rotation, only: jacobi_rotation, rotate_columns, rotate_rows
    use rodyn_lapack, only: dpotrf, dpotrs, dsyev, dgemm, dgemv
    implicit none (type, external)
    private
@@ -124,7 +125,7 @@ contains
       real(wp), contiguous, intent(inout) :: h(:, :), x(:, :), y(:, :)
       real(wp), parameter :: negligible = 1.0e-5_wp !! off the diagonal, of the smaller element on it
       integer, parameter :: most_sweeps = 12
-      real(wp) :: theta, t, c, s
+      real(wp) :: c, s
       integer :: sweep, i, j
       logical :: done
 
@@ -134,10 +135,7 @@ contains
             do i = 1, j - 1
                if (abs(h(i, j)) <= negligible*max(smallest, min(abs(h(i, i)), abs(h(j, j))))) cycle
                done = .false.
-               theta = 0.5_wp*(h(j, j) - h(i, i))/h(i, j)
-               t = sign(1.0_wp, theta)/(abs(theta) + sqrt(1.0_wp + theta**2))
-               c = 1.0_wp/sqrt(1.0_wp + t**2)
-               s = t*c
+               call jacobi_rotation(h, i, j, c, s)
                call rotate_columns(h, i, j, c, s)
                call rotate_rows(h, i, j, c, s)
                call rotate_columns(x, i, j, c, s)
@@ -147,31 +145,5 @@ contains
          if (done) return
       end do
    end subroutine diagonalise
-
-   pure subroutine rotate_columns(x, i, j, c, s)
-      real(wp), contiguous, intent(inout) :: x(:, :)
-      integer, intent(in) :: i, j
-      real(wp), intent(in) :: c, s
-      real(wp) :: before
-      integer :: k
-      do k = 1, size(x, 1)
-         before = x(k, i)
-         x(k, i) = c*before - s*x(k, j)
-         x(k, j) = s*before + c*x(k, j)
-      end do
-   end subroutine rotate_columns
-
-   pure subroutine rotate_rows(x, i, j, c, s)
-      real(wp), contiguous, intent(inout) :: x(:, :)
-      integer, intent(in) :: i, j
-      real(wp), intent(in) :: c, s
-      real(wp) :: before
-      integer :: k
-      do k = 1, size(x, 2)
-         before = x(i, k)
-         x(i, k) = c*before - s*x(j, k)
-         x(j, k) = s*before + c*x(j, k)
-      end do
-   end subroutine rotate_rows
 
 end module rodyn_scene_modes

@@ -3,10 +3,11 @@ module rodyn_case_rules
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: case_config, load_config, profile_config
    use rodyn_case_fields, only: law_takes
-   use rodyn_checked_document, only: checked_document, blame, entry_of, is_sound
+   use rodyn_checked_document, only: checked_document, blame, is_given, is_sound, no_such, require
    use rodyn_hinge_rules, only: check_moving_hinges
+   use rodyn_law_rules, only: check_law_keys, check_table
    use rodyn_rod_profile, only: rod_profile, new_rod_profile, smallest_value
-   use rodyn_text, only: to_text
+   use rodyn_text, only: short_text, to_text
    implicit none (type, external)
    private
    public :: check_case
@@ -19,7 +20,7 @@ contains
    subroutine check_case(checked, config)
       type(checked_document), intent(inout) :: checked
       type(case_config), intent(in) :: config
-      integer :: i
+      integer :: i, k
 
       call check_spacecraft(checked, config)
       call check_model(checked, config)
@@ -32,28 +33,15 @@ contains
       end do
       do i = 1, size(config%loads)
          call check_target(checked, i, config%loads(i), config%chain%n_rods)
-         call check_law_keys(checked, i, config%loads(i))
+         associate (law => config%loads(i)%law)
+            call check_law_keys(checked, 'load', i, law, law_keys, [(law_takes(law, trim(law_keys(k))), k=1, size(law_keys))], &
+                                law_keys /= 'rise_time')
+         end associate
          call check_times(checked, i, config%loads(i))
-         if (config%loads(i)%law == 'table') call check_table(checked, i, config%loads(i))
+         if (config%loads(i)%law == 'table') call check_table(checked, 'load', i, config%loads(i)%times, config%loads(i)%values)
       end do
       call check_moving_hinges(checked, config)
    end subroutine check_case
-
-   !> Is the key given, rightly or wrongly?
-   logical function given(checked, group, instance, key)
-      type(checked_document), intent(in) :: checked
-      character(len=*), intent(in) :: group, key
-      integer, intent(in) :: instance
-      given = entry_of(checked, group, instance, key, any_state=.true.) > 0
-   end function given
-
-   subroutine require(checked, group, instance, key, reason)
-      type(checked_document), intent(inout) :: checked
-      character(len=*), intent(in) :: group, key, reason
-      integer, intent(in) :: instance
-      if (given(checked, group, instance, key)) return
-      call blame(checked, group, instance, key, 'is required '//reason)
-   end subroutine require
 
    !> A free spacecraft has mass and inertia; a fixed one does not move.
    subroutine check_spacecraft(checked, config)
@@ -91,7 +79,7 @@ contains
 
       if (.not. (is_sound(checked, 'model', 1, 'bending') .and. is_sound(checked, 'model', 1, 'inertia'))) return
       key = 'bending'
-      if (.not. given(checked, 'model', 1, key)) key = 'inertia'
+      if (.not. is_given(checked, 'model', 1, key)) key = 'inertia'
       if (config%model%bending == 'dynamic' .and. config%model%inertia == 'lumped') then
          call blame(checked, 'model', 1, key, "bending = 'dynamic' is not possible with inertia = 'lumped'; " &
             //"take 'quasistatic' or 'rigid'")
@@ -171,7 +159,7 @@ contains
          character(len=*), intent(in) :: key
          sound_chain = .false.
          if (config%chain%n_rods < 1) return
-         if (.not. is_sound(checked, 'chain', 1, key) .or. .not. given(checked, 'chain', 1, key)) return
+         if (.not. is_sound(checked, 'chain', 1, key) .or. .not. is_given(checked, 'chain', 1, key)) return
          sound_chain = size(config%chain%mass_per_length) == config%chain%n_rods
       end function sound_chain
 
@@ -187,7 +175,7 @@ contains
       if (.not. (is_sound(checked, 'rod_profile', i, 'first_rod') .and. is_sound(checked, 'rod_profile', i, 'last_rod'))) return
       if (n_rods > 0 .and. max(profile%first_rod, profile%last_rod) > n_rods) then
          call blame(checked, 'rod_profile', i, trim(merge('first_rod', 'last_rod ', profile%first_rod > n_rods)), &
-            'there is no such rod; they are numbered 1..'//to_text(n_rods))
+            no_such('rod', 1, n_rods))
       else if (n_rods > 0 .and. profile%first_rod > profile%last_rod) then
          call blame(checked, 'rod_profile', i, 'last_rod', 'must not be less than first_rod = '//to_text(profile%first_rod))
       end if
@@ -205,8 +193,8 @@ contains
       logical :: ok
 
       key = 'polynomial'
-      if (given(checked, 'rod_profile', i, 'positions') .or. given(checked, 'rod_profile', i, 'values')) then
-         if (given(checked, 'rod_profile', i, key)) then
+      if (is_given(checked, 'rod_profile', i, 'positions') .or. is_given(checked, 'rod_profile', i, 'values')) then
+         if (is_given(checked, 'rod_profile', i, key)) then
             call blame(checked, 'rod_profile', i, key, 'does not go with positions and values')
             return
          end if
@@ -223,7 +211,7 @@ contains
       call new_rod_profile(compiled, profile)
       if (smallest_value(compiled) < 0.0_wp) then
          call blame(checked, 'rod_profile', i, key, 'must not be negative anywhere from 0 to 1, but goes down to '// &
-            short(smallest_value(compiled)))
+            short_text(smallest_value(compiled)))
       else if (.not. compiled%mean() > 0.0_wp) then
          call blame(checked, 'rod_profile', i, key, 'must not be zero everywhere')
       else if (positive .and. profile%quantity == 'bending_stiffness' .and. .not. smallest_value(compiled) > 0.0_wp) then
@@ -268,7 +256,7 @@ contains
          call blame(checked, 'solver', 1, 'fixed_step', "is possible with method = 'erk', 'dop853' or 'gauss' only")
       else if (config%t_end/config%solver%max_steps > config%solver%fixed_step) then
          call blame(checked, 'solver', 1, 'fixed_step', 'would make more than max_steps = '// &
-                    to_text(config%solver%max_steps)//' steps until t_end = '//short(config%t_end)//' [s]')
+                    to_text(config%solver%max_steps)//' steps until t_end = '//short_text(config%t_end)//' [s]')
       end if
    end subroutine check_solver
 
@@ -303,37 +291,16 @@ contains
 
       if (.not. is_sound(checked, 'load', i, 'target')) return
       if (load%target == 'spacecraft') then
-         if (.not. given(checked, 'load', i, 'node')) return
+         if (.not. is_given(checked, 'load', i, 'node')) return
          call blame(checked, 'load', i, 'node', "goes with target = 'node' only")
          return
       end if
       call require(checked, 'load', i, 'node', "when target = 'node'")
-      if (n_rods > 0 .and. load%node > n_rods) call blame(checked, 'load', i, 'node', &
-         'there is no such node; they are numbered 1..'//to_text(n_rods))
+      if (n_rods > 0 .and. load%node > n_rods) call blame(checked, 'load', i, 'node', no_such('node', 1, n_rods))
       if (load%component /= 'M' .or. .not. is_sound(checked, 'load', i, 'component')) return
       call blame(checked, 'load', i, 'component', &
          "must be 'X' or 'Y' when target = 'node'; moments act on the spacecraft only")
    end subroutine check_target
-
-   !> Each law has its own keys and takes no others.
-   subroutine check_law_keys(checked, i, load)
-      type(checked_document), intent(inout) :: checked
-      integer, intent(in) :: i
-      type(load_config), intent(in) :: load
-      character(len=:), allocatable :: key
-      integer :: k
-
-      if (.not. is_sound(checked, 'load', i, 'law')) return
-      do k = 1, size(law_keys)
-         key = trim(law_keys(k))
-         if (.not. law_takes(load%law, key)) then
-            if (given(checked, 'load', i, key)) call blame(checked, 'load', i, key, &
-               "does not go with law = '"//trim(load%law)//"'")
-         else if (key /= 'rise_time') then
-            call require(checked, 'load', i, key, "when law = '"//trim(load%law)//"'")
-         end if
-      end do
-   end subroutine check_law_keys
 
    !> The load must not end before it begins, and a smooth step must fit in between.
    subroutine check_times(checked, i, load)
@@ -342,53 +309,22 @@ contains
       type(load_config), intent(in) :: load
 
       if (.not. (is_sound(checked, 'load', i, 't_start') .and. is_sound(checked, 'load', i, 't_end'))) return
-      if (.not. given(checked, 'load', i, 't_end') .and. .not. is_sound(checked, 'case', 1, 't_end')) return
+      if (.not. is_given(checked, 'load', i, 't_end') .and. .not. is_sound(checked, 'case', 1, 't_end')) return
       if (load%t_start > load%t_end) then
-         if (given(checked, 'load', i, 't_start')) then
-            call blame(checked, 'load', i, 't_start', 'must not be after t_end = '//short(load%t_end)//' [s]')
+         if (is_given(checked, 'load', i, 't_start')) then
+            call blame(checked, 'load', i, 't_start', 'must not be after t_end = '//short_text(load%t_end)//' [s]')
          else
-            call blame(checked, 'load', i, 't_end', 'must not be before t_start = '//short(load%t_start)//' [s]')
+            call blame(checked, 'load', i, 't_end', 'must not be before t_start = '//short_text(load%t_start)//' [s]')
          end if
       else if (load%law == 'smooth_step' .and. is_sound(checked, 'load', i, 'rise_time') .and. &
                is_sound(checked, 'load', i, 'law')) then
          if (load%rise_time > load%t_end - load%t_start) then
             call blame(checked, 'load', i, 'rise_time', 'must not exceed t_end - t_start = ' &
-               //short(load%t_end - load%t_start)//' [s]')
+               //short_text(load%t_end - load%t_start)//' [s]')
          else if (.not. load%rise_time > 0.0_wp) then
             call blame(checked, 'load', i, 'rise_time', 'must be positive, but t_end = t_start [s]')
          end if
       end if
    end subroutine check_times
-
-   !> As many values as times, two at least, and times that increase.
-   subroutine check_table(checked, i, load)
-      type(checked_document), intent(inout) :: checked
-      integer, intent(in) :: i
-      type(load_config), intent(in) :: load
-      integer :: k
-
-      if (entry_of(checked, 'load', i, 'times') == 0) return
-      if (size(load%times) < 2) call blame(checked, 'load', i, 'times', 'must be two values at least')
-      if (entry_of(checked, 'load', i, 'values') > 0 .and. size(load%values) /= size(load%times)) then
-         call blame(checked, 'load', i, 'values', 'must be as many as times: '//to_text(size(load%times)) &
-            //', not '//to_text(size(load%values)))
-      end if
-      do k = 2, size(load%times)
-         if (load%times(k) > load%times(k - 1)) cycle
-         call blame(checked, 'load', i, 'times', 'must increase, but value '//to_text(k)//', '//short(load%times(k)) &
-            //', follows '//short(load%times(k - 1))//' [s]')
-         return
-      end do
-   end subroutine check_table
-
-   !> A number for a message, six significant digits.
-   pure function short(x) result(text)
-      real(wp), intent(in) :: x
-      character(len=:), allocatable :: text
-      character(len=16) :: digits
-      write (digits, '(g0.6)') x
-      text = trim(adjustl(digits))
-      if (text(1:1) == '.') text = '0'//text ! which some compilers leave out
-   end function short
 
 end module rodyn_case_rules

@@ -11,7 +11,7 @@ module rodyn_checked_document
    use rodyn_text, only: printable, to_text
    implicit none (type, external)
    private
-   public :: checked_document, match_document, blame, entry_of, is_sound, group_at, instances
+   public :: checked_document, match_document, blame, require, no_such, entry_of, is_given, is_sound, group_at, instances
 
    !> The document, the schema, and what came out. Lives no longer than the document.
    type :: checked_document
@@ -164,26 +164,37 @@ contains
       end associate
    end subroutine complain_of_key
 
-   !> The entry that gives a key in the `instance`-th group of that name; 0 if there is none.
-   integer function entry_of(checked, group, instance, key, any_state) result(found)
+   !> The entry that gives a key rightly in the `instance`-th group of that name; 0 if there is none.
+   integer function entry_of(checked, group, instance, key) result(found)
       type(checked_document), intent(in) :: checked
       character(len=*), intent(in) :: group, key
       integer, intent(in) :: instance
-      logical, intent(in), optional :: any_state !! also an entry that breaks its rules
-      logical :: any_will_do
       integer :: g, r
 
-      any_will_do = .false.
-      if (present(any_state)) any_will_do = any_state
       found = 0
       g = group_at(checked, group, instance)
       if (g == 0) return
       r = row_index(checked%rows, group, key)
       do found = checked%document%groups(g)%first, checked%document%groups(g)%last
-         if (checked%row(found) == r .and. (checked%ok(found) .or. any_will_do)) return
+         if (checked%row(found) == r .and. checked%ok(found)) return
       end do
       found = 0
    end function entry_of
+
+   !> Is the key given, rightly or wrongly?
+   logical function is_given(checked, group, instance, key)
+      type(checked_document), intent(in) :: checked
+      character(len=*), intent(in) :: group, key
+      integer, intent(in) :: instance
+      integer :: g
+
+      is_given = .false.
+      g = group_at(checked, group, instance)
+      if (g == 0) return
+      associate (entries => checked%document%groups(g))
+         is_given = any(checked%row(entries%first:entries%last) == row_index(checked%rows, group, key))
+      end associate
+   end function is_given
 
    !> True unless some assignment to the key breaks a rule, so that its value is not known.
    logical function is_sound(checked, group, instance, key) result(sound)
@@ -226,5 +237,23 @@ contains
       end if
       call checked%faults%add(line, '&'//group//' '//key//shown//': '//rule)
    end subroutine blame
+
+   !> Note a key that is not given but must be.
+   subroutine require(checked, group, instance, key, when)
+      type(checked_document), intent(inout) :: checked
+      character(len=*), intent(in) :: group, key
+      integer, intent(in) :: instance
+      character(len=*), intent(in) :: when !! as in 'is required '//when; empty: always
+      if (is_given(checked, group, instance, key)) return
+      call blame(checked, group, instance, key, trim('is required '//when))
+   end subroutine require
+
+   !> The fault of a number that no rod, node, hinge ... has.
+   pure function no_such(what, first, last) result(rule)
+      character(len=*), intent(in) :: what
+      integer, intent(in) :: first, last
+      character(len=:), allocatable :: rule
+      rule = 'there is no such '//what//'; they are numbered '//to_text(first)//'..'//to_text(last)
+   end function no_such
 
 end module rodyn_checked_document

@@ -1,7 +1,7 @@
 !> Does every assignment of a document keep the rules of its row, and is everything there that must be?
 module rodyn_document_checks
    use rodyn_kinds, only: i8
-   use rodyn_checked_document, only: checked_document, blame, entry_of, instances
+   use rodyn_checked_document, only: checked_document, instances, no_such, require
    use rodyn_namelist_document, only: namelist_document, namelist_entry, index_text, shown_value, shown_values
    use rodyn_schema, only: schema_extent, any_list, group_index, one_value
    use rodyn_text, only: is_digit, to_text
@@ -31,18 +31,10 @@ contains
          if (checked%rows(r)%default /= 'required') cycle
          k = group_index(checked%groups, checked%rows(r)%group)
          do g = 1, merge(instances(checked, trim(checked%rows(r)%group)), 1, checked%groups(k)%repeatable)
-            call require(checked, trim(checked%rows(r)%group), g, trim(checked%rows(r)%key))
+            call require(checked, trim(checked%rows(r)%group), g, trim(checked%rows(r)%key), '')
          end do
       end do
    end subroutine check_document
-
-   subroutine require(checked, group, instance, key)
-      type(checked_document), intent(inout) :: checked
-      character(len=*), intent(in) :: group, key
-      integer, intent(in) :: instance
-      if (entry_of(checked, group, instance, key, any_state=.true.) > 0) return
-      call blame(checked, group, instance, key, 'is required')
-   end subroutine require
 
    !> Index and count, then values.
    subroutine check_entry(checked, g, e)
@@ -147,8 +139,7 @@ contains
          if (entry%indexed) then
             wanted = entry%upper - entry%lower + 1
             if (entry%lower < extent%lower .or. entry%upper > upper) then
-               call reject(checked, g, e, 'there is no such '//trim(extent%name)//'; they are numbered ' &
-                  //to_text(extent%lower)//'..'//to_text(upper))
+               call reject(checked, g, e, no_such(trim(extent%name), extent%lower, upper))
                return
             end if
          end if

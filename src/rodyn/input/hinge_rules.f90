@@ -3,8 +3,8 @@ module rodyn_hinge_rules
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: case_config, hinge_config, kink_config, none_given
    use rodyn_case_fields, only: kink_law_takes
-   use rodyn_checked_document, only: checked_document, blame, entry_of, is_sound
-   use rodyn_text, only: to_text
+   use rodyn_checked_document, only: checked_document, blame, is_given, is_sound, no_such
+   use rodyn_law_rules, only: check_law_keys, check_table
    implicit none (type, external)
    private
    public :: check_moving_hinges
@@ -17,16 +17,20 @@ contains
    subroutine check_moving_hinges(checked, config)
       type(checked_document), intent(inout) :: checked
       type(case_config), intent(in) :: config
-      integer :: i
+      integer :: i, k
 
       do i = 1, size(config%kink_programs)
-         call check_exists(checked, 'kink_program', i, 'hinge', config%kink_programs(i)%hinge, config%chain%n_rods)
-         call check_law_keys(checked, i, config%kink_programs(i))
+         call check_exists(checked, 'kink_program', i, config%kink_programs(i)%hinge, config%chain%n_rods)
+         associate (law => config%kink_programs(i)%law)
+            call check_law_keys(checked, 'kink_program', i, law, law_keys, &
+                                [(kink_law_takes(law, trim(law_keys(k))), k=1, size(law_keys))], &
+                                law_keys /= 't_start' .and. law_keys /= 't_end')
+         end associate
          call check_program_times(checked, i, config%kink_programs(i))
          call check_jumps(checked, i, config%kink_programs(i), config)
       end do
       do i = 1, size(config%hinges)
-         call check_exists(checked, 'hinge', i, 'hinge', config%hinges(i)%hinge, config%chain%n_rods)
+         call check_exists(checked, 'hinge', i, config%hinges(i)%hinge, config%chain%n_rods)
          call check_once(checked, i, config%hinges)
          call check_release(checked, i, config%hinges)
          call check_stops(checked, i, config%hinges(i))
@@ -35,42 +39,15 @@ contains
       end do
    end subroutine check_moving_hinges
 
-   !> Is the key given, rightly or wrongly?
-   logical function given(checked, group, instance, key)
-      type(checked_document), intent(in) :: checked
-      character(len=*), intent(in) :: group, key
-      integer, intent(in) :: instance
-      given = entry_of(checked, group, instance, key, any_state=.true.) > 0
-   end function given
-
-   subroutine check_exists(checked, group, i, key, hinge, n_rods)
+   !> Hinges are numbered from 0; that a number is not negative stands in the table.
+   subroutine check_exists(checked, group, i, hinge, n_rods)
       type(checked_document), intent(inout) :: checked
-      character(len=*), intent(in) :: group, key
+      character(len=*), intent(in) :: group
       integer, intent(in) :: i, hinge, n_rods !! n_rods 0: not known
       if (n_rods < 1 .or. hinge < n_rods) return
-      if (.not. is_sound(checked, group, i, key)) return
-      call blame(checked, group, i, key, 'there is no such hinge; they are numbered 0..'//to_text(n_rods - 1))
+      if (.not. is_sound(checked, group, i, 'hinge')) return
+      call blame(checked, group, i, 'hinge', no_such('hinge', 0, n_rods - 1))
    end subroutine check_exists
-
-   !> Each law has its own keys and takes no others.
-   subroutine check_law_keys(checked, i, program)
-      type(checked_document), intent(inout) :: checked
-      integer, intent(in) :: i
-      type(kink_config), intent(in) :: program
-      character(len=:), allocatable :: key
-      integer :: k
-
-      if (.not. is_sound(checked, 'kink_program', i, 'law')) return
-      do k = 1, size(law_keys)
-         key = trim(law_keys(k))
-         if (.not. kink_law_takes(program%law, key)) then
-            if (given(checked, 'kink_program', i, key)) call blame(checked, 'kink_program', i, key, &
-               "does not go with law = '"//trim(program%law)//"'")
-         else if (k > 2 .and. .not. given(checked, 'kink_program', i, key)) then ! the times have defaults
-            call blame(checked, 'kink_program', i, key, "is required when law = '"//trim(program%law)//"'")
-         end if
-      end do
-   end subroutine check_law_keys
 
    !> A program must not end before it begins; only a ramp may be a step. Tables have values at times that increase.
    subroutine check_program_times(checked, i, program)
@@ -79,15 +56,7 @@ contains
       type(kink_config), intent(in) :: program
 
       if (program%law == 'table') then
-         if (entry_of(checked, 'kink_program', i, 'times') == 0) return
-         if (size(program%times) < 2) then
-            call blame(checked, 'kink_program', i, 'times', 'must be two values at least')
-         else if (any(program%times(2:) <= program%times(:size(program%times) - 1))) then
-            call blame(checked, 'kink_program', i, 'times', 'must increase')
-         end if
-         if (entry_of(checked, 'kink_program', i, 'values') > 0 .and. size(program%values) /= size(program%times)) &
-            call blame(checked, 'kink_program', i, 'values', 'must be as many as times: '//to_text(size(program%times)) &
-                       //', not '//to_text(size(program%values)))
+         call check_table(checked, 'kink_program', i, program%times, program%values)
          return
       end if
       if (.not. (is_sound(checked, 'kink_program', i, 't_start') .and. is_sound(checked, 'kink_program', i, 't_end'))) return
@@ -126,6 +95,7 @@ contains
       end do
    end subroutine check_jumps
 
+   !> One group for each hinge.
    subroutine check_once(checked, i, hinges)
       type(checked_document), intent(inout) :: checked
       integer, intent(in) :: i
@@ -143,8 +113,8 @@ contains
       logical :: by_time, by_latch
       integer :: k
 
-      by_time = given(checked, 'hinge', i, 'release_time')
-      by_latch = given(checked, 'hinge', i, 'release_after')
+      by_time = is_given(checked, 'hinge', i, 'release_time')
+      by_latch = is_given(checked, 'hinge', i, 'release_after')
       if (is_sound(checked, 'hinge', i, 'held') .and. .not. hinges(i)%held) then
          if (by_time) call blame(checked, 'hinge', i, 'release_time', 'goes with held = .true. only')
          if (by_latch) call blame(checked, 'hinge', i, 'release_after', 'goes with held = .true. only')
@@ -158,6 +128,7 @@ contains
       call blame(checked, 'hinge', i, 'release_after', 'that hinge must have a latch_angle of its own')
    end subroutine check_release
 
+   !> Stops, freeplay and locks need their stiffnesses, and these need them.
    subroutine check_stops(checked, i, hinge)
       type(checked_document), intent(inout) :: checked
       integer, intent(in) :: i
@@ -178,6 +149,7 @@ contains
          call blame(checked, 'hinge', i, 'lock_damping', 'goes with lock_stiffness only')
    end subroutine check_stops
 
+   !> Moment and velocity of dry friction go together.
    subroutine check_friction(checked, i, hinge)
       type(checked_document), intent(inout) :: checked
       integer, intent(in) :: i

@@ -45,28 +45,8 @@ contains
       integer, intent(in) :: n
       real(wp), intent(in) :: a(s, s), x(s, n)
       real(wp), intent(out) :: y(s, n)
-      real(wp), dimension(s) :: y_1, y_2, y_3
-      integer :: i, j, l
-      do j = 1, n - 2, 3
-         y_1 = 0.0_wp
-         y_2 = 0.0_wp
-         y_3 = 0.0_wp
-         do i = 1, s
-            !$omp simd
-            do l = 1, s
-               y_1(l) = y_1(l) + a(l, i)*x(i, j)
-               y_2(l) = y_2(l) + a(l, i)*x(i, j + 1)
-               y_3(l) = y_3(l) + a(l, i)*x(i, j + 2)
-            end do
-         end do
-         y(:, j) = y_1
-         y(:, j + 1) = y_2
-         y(:, j + 2) = y_3
-      end do
-      do j = n - modulo(n, 3) + 1, n
-         y(:, j) = 0.0_wp
-         call apply_one(a, x(:, j), y(:, j))
-      end do
+      y = 0.0_wp
+      call apply(n, a, x, y)
    end subroutine multiply
 
    !> y = y + A x. Two sums, since each addition waits for the one before.

@@ -139,7 +139,6 @@ contains
       character(len=:), allocatable :: text
       character(len=16) :: digits
       if (value >= 1.0e-3_wp .and. value < 1.0e6_wp) then
-         write (digits, '(g0.4)') value
          text = time_text(real(nint(value*10.0_wp**(2 - floor(log10(value)))), wp)*10.0_wp**(floor(log10(value)) - 2))
       else
          write (digits, '(es8.2)') value

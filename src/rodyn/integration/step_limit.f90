@@ -35,7 +35,7 @@ contains
       if (.not. options%fixed_step > 0.0_wp .or. options%allow_unstable) return
       call stability_function_of(r, method, options%order, error)
       if (allocated(error) .or. .not. allocated(r%coefficient)) return
-      call fast_eigenvalues(scene, y, lambda)
+      call fast_eigenvalues(scene, y, t_end, lambda)
       step = longest_step(scene, options%fixed_step, t_end)
       growth = growth_in_run(r, lambda, step, t_end)
       if (all(growth <= log(most_growth))) return
@@ -47,16 +47,14 @@ contains
       end associate
    end subroutine check_fixed_step
 
-   !> The longest of the steps that are really taken: each interval between switches of loads has a whole number of them.
+   !> The longest of the steps that are really taken: each interval between switches has a whole number of them.
    pure real(wp) function longest_step(scene, fixed_step, t_end)
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: fixed_step, t_end !! [s]
       real(wp), allocatable :: ends(:)
       integer :: i
 
-      associate (switches => scene%loads%switches)
-         ends = [0.0_wp, pack(switches, switches > 0.0_wp .and. switches < t_end), t_end]
-      end associate
+      ends = [0.0_wp, pack(scene%switches, scene%switches < t_end), t_end]
       longest_step = 0.0_wp
       do i = 2, size(ends)
          associate (span => ends(i) - ends(i - 1))

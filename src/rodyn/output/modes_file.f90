@@ -17,6 +17,7 @@ module rodyn_modes_file
 
    real(wp), parameter :: pi = acos(-1.0_wp)
    integer, parameter :: name_length = 24
+   integer, parameter :: compression = 4
 
 contains
 
@@ -31,15 +32,14 @@ contains
       logical, intent(in) :: equilibrium       !! the state was sought as one
       type(error_type), allocatable, intent(out) :: error
       type(result_file) :: file
-      integer :: compression, i
+      integer :: i
 
-      compression = 4
       call file%begin(path, force, error)
       if (allocated(error)) return
       call file%write_provenance(origin, error)
       if (.not. allocated(error)) call write_axes()
       if (.not. allocated(error)) call write_eigenvalues()
-      if (.not. allocated(error)) call write_shapes(file, scene, model, modes, compression, error)
+      if (.not. allocated(error)) call write_shapes(file, scene, model, modes, error)
       if (.not. allocated(error)) call write_state()
       if (.not. allocated(error)) call write_matrices()
       if (.not. allocated(error)) call write_summary()
@@ -96,27 +96,16 @@ contains
       subroutine per_mode(name, values, units, long_name)
          character(len=*), intent(in) :: name, units, long_name
          real(wp), contiguous, intent(in) :: values(:)
-         if (allocated(error)) return
-         call file%file%write(name, values, compression, error)
-         if (.not. allocated(error)) call file%describe(name, units, long_name, error)
-         if (.not. allocated(error)) call file%file%attach_scale(name, 1, 'mode', error)
+         call write_vector(file, name, values, 'mode', units, long_name, error)
       end subroutine per_mode
 
       !> The state the equations are linearised about.
       subroutine write_state()
-         call vector('state', model%q, 'coordinate', 'm or rad', 'coordinates of the state')
-         call vector('state_rate', model%p, 'rate', 'm s-1 or rad s-1', 'rates of the state')
-         call vector('state_acceleration', model%acceleration, 'rate', 'm s-2 or rad s-2', 'rates of these rates')
+         call write_vector(file, 'state', model%q, 'coordinate', 'm or rad', 'coordinates of the state', error)
+         call write_vector(file, 'state_rate', model%p, 'rate', 'm s-1 or rad s-1', 'rates of the state', error)
+         call write_vector(file, 'state_acceleration', model%acceleration, 'rate', 'm s-2 or rad s-2', &
+                           'rates of these rates', error)
       end subroutine write_state
-
-      subroutine vector(name, values, scale, units, long_name)
-         character(len=*), intent(in) :: name, scale, units, long_name
-         real(wp), contiguous, intent(in) :: values(:)
-         if (allocated(error)) return
-         call file%file%write(name, values, compression, error)
-         if (.not. allocated(error)) call file%describe(name, units, long_name, error)
-         if (.not. allocated(error)) call file%file%attach_scale(name, 1, scale, error)
-      end subroutine vector
 
       subroutine write_matrices()
          call matrix('mass_matrix', model%mass, 'rate', 'kg, kg m or kg m2', 'M of M dp'' + (D + G) dp + K dq = 0')
@@ -129,13 +118,7 @@ contains
       subroutine matrix(name, values, column, units, long_name)
          character(len=*), intent(in) :: name, column, units, long_name
          real(wp), contiguous, intent(in) :: values(:, :)
-         real(wp), allocatable :: rows(:, :)
-         if (allocated(error)) return
-         rows = transpose(values)
-         call file%file%write(name, rows, compression, error)
-         if (.not. allocated(error)) call file%describe(name, units, long_name, error)
-         if (.not. allocated(error)) call file%file%attach_scale(name, 1, column, error)
-         if (.not. allocated(error)) call file%file%attach_scale(name, 2, 'equation', error)
+         call write_table(file, name, transpose(values), column, 'equation', units, long_name, error)
       end subroutine matrix
 
       subroutine write_summary()
@@ -156,7 +139,6 @@ contains
       integer :: i, at
 
       allocate (names(merge(scene%n_dof, scene%n_q, rates)))
-      at = 0
       if (scene%n_base > 0 .and. rates) names(:3) = [character(len=name_length) :: 'velocity_x', 'velocity_y', 'omega']
       if (scene%n_base > 0 .and. .not. rates) &
          names(:3) = [character(len=name_length) :: 'displacement_x', 'displacement_y', 'rotation']
@@ -185,12 +167,11 @@ contains
    end function coordinate_names
 
    !> The shapes, one coordinate after the other; what the scene has not is zero, and slopes without inertia follow.
-   subroutine write_shapes(file, scene, model, modes, compression, error)
+   subroutine write_shapes(file, scene, model, modes, error)
       type(result_file), intent(in) :: file
       type(scene_type), intent(in) :: scene
       type(linear_model), intent(in) :: model
       type(mode_set), intent(in) :: modes
-      integer, intent(in) :: compression
       type(error_type), allocatable, intent(out) :: error
       complex(wp), allocatable :: place(:, :), phi(:, :), alpha(:, :), beta(:, :)
       integer :: i
@@ -218,18 +199,9 @@ contains
       subroutine scalar(name, x, units, long_name)
          character(len=*), intent(in) :: name, units, long_name
          complex(wp), contiguous, intent(in) :: x(:)
-         call part(name//'_real', real(x, wp), units, long_name//', real part of the shape')
-         call part(name//'_imag', aimag(x), units, long_name//', imaginary part of the shape')
+         call write_vector(file, name//'_real', real(x, wp), 'mode', units, long_name//', real part of the shape', error)
+         call write_vector(file, name//'_imag', aimag(x), 'mode', units, long_name//', imaginary part of the shape', error)
       end subroutine scalar
-
-      subroutine part(name, x, units, long_name)
-         character(len=*), intent(in) :: name, units, long_name
-         real(wp), contiguous, intent(in) :: x(:)
-         if (allocated(error)) return
-         call file%file%write(name, x, compression, error)
-         if (.not. allocated(error)) call file%describe(name, units, long_name, error)
-         if (.not. allocated(error)) call file%file%attach_scale(name, 1, 'mode', error)
-      end subroutine part
 
       subroutine table(name, x, scale, long_name, units)
          character(len=*), intent(in) :: name, scale, long_name
@@ -238,21 +210,38 @@ contains
          character(len=:), allocatable :: unit
          unit = 'rad'
          if (present(units)) unit = units
-         call table_part(name//'_real', real(x, wp), scale, unit, long_name//', real part of the shape')
-         call table_part(name//'_imag', aimag(x), scale, unit, long_name//', imaginary part of the shape')
+         call write_table(file, name//'_real', real(x, wp), scale, 'mode', unit, long_name//', real part of the shape', error)
+         call write_table(file, name//'_imag', aimag(x), scale, 'mode', unit, long_name//', imaginary part of the shape', error)
       end subroutine table
 
-      subroutine table_part(name, x, scale, unit, long_name)
-         character(len=*), intent(in) :: name, scale, unit, long_name
-         real(wp), contiguous, intent(in) :: x(:, :)
-         if (allocated(error)) return
-         call file%file%write(name, x, compression, error)
-         if (.not. allocated(error)) call file%describe(name, unit, long_name, error)
-         if (.not. allocated(error)) call file%file%attach_scale(name, 1, scale, error)
-         if (.not. allocated(error)) call file%file%attach_scale(name, 2, 'mode', error)
-      end subroutine table_part
-
    end subroutine write_shapes
+
+   !> A data set over one scale. Nothing is written after an error.
+   subroutine write_vector(file, name, values, scale, units, long_name, error)
+      type(result_file), intent(in) :: file
+      character(len=*), intent(in) :: name, scale, units, long_name
+      real(wp), contiguous, intent(in) :: values(:)
+      type(error_type), allocatable, intent(inout) :: error
+
+      if (allocated(error)) return
+      call file%file%write(name, values, compression, error)
+      if (.not. allocated(error)) call file%describe(name, units, long_name, error)
+      if (.not. allocated(error)) call file%file%attach_scale(name, 1, scale, error)
+   end subroutine write_vector
+
+   !> The same over two, the one that runs fastest first.
+   subroutine write_table(file, name, values, fast_scale, slow_scale, units, long_name, error)
+      type(result_file), intent(in) :: file
+      character(len=*), intent(in) :: name, fast_scale, slow_scale, units, long_name
+      real(wp), contiguous, intent(in) :: values(:, :)
+      type(error_type), allocatable, intent(inout) :: error
+
+      if (allocated(error)) return
+      call file%file%write(name, values, compression, error)
+      if (.not. allocated(error)) call file%describe(name, units, long_name, error)
+      if (.not. allocated(error)) call file%file%attach_scale(name, 1, fast_scale, error)
+      if (.not. allocated(error)) call file%file%attach_scale(name, 2, slow_scale, error)
+   end subroutine write_table
 
    !> Slopes that go with a change of q: they are affine in it.
    subroutine slope_shapes(scene, n_p, shape, alpha, beta)

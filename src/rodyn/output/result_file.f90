@@ -195,6 +195,7 @@ contains
       end do
    end function free_temporary_name
 
+   !> A text that may not be there.
    pure function text_or_empty(text) result(value)
       character(len=:), allocatable, intent(in) :: text
       character(len=:), allocatable :: value

@@ -131,6 +131,7 @@ contains
       is_finite = is_finite .and. all(abs(row%phi) <= most) .and. all(abs(row%phi_rate) <= most)
       is_finite = is_finite .and. all(abs(row%alpha) <= most) .and. all(abs(row%alpha_rate) <= most)
       is_finite = is_finite .and. all(abs(row%beta) <= most) .and. all(abs(row%beta_rate) <= most)
+      is_finite = is_finite .and. all(abs(row%bubble) <= most) .and. all(abs(row%bubble_rate) <= most)
    end function is_finite
 
    !> Let the finished file have another name, replacing what has it: the rows of a stopped run do not take the

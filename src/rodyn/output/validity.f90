@@ -47,6 +47,7 @@ module rodyn_validity
 
 contains
 
+   !> Nothing seen yet of the rods of a scene.
    function new_validity(scene, deflection_limit) result(self)
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: deflection_limit !! of v/l

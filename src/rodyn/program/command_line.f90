@@ -96,21 +96,31 @@ contains
       type(input_texts) :: input
       character(len=:), allocatable :: path
 
-      call read_input_texts(options%file, input, error)
-      if (allocated(error)) return
-      if (input%is_sweep) then
-         call raise(error, options%file//': is a sweep; rodyn sweep computes it', exit_bad_input)
-         return
-      end if
-      call parse_case(input%text, input%name, config, error)
+      call read_one_case(options%file, 'rodyn sweep computes it', input, config, error)
       if (allocated(error)) return
       path = output_path(options, config, input%from_result)
       call refuse_input(path, options%file, error)
-      if (.not. allocated(error)) call refuse_steps(options, config, error)
       if (allocated(error)) return
       call watch_signals()
-      call run_case(config, path, error, input_text=input%text, force=options%force, quiet=options%quiet)
+      call run_case(config, path, error, input_text=input%text, force=options%force, quiet=options%quiet, name=options%file)
    end subroutine run_file_command
+
+   !> The case of a file, which must not be a sweep.
+   subroutine read_one_case(file, instead, input, config, error)
+      character(len=*), intent(in) :: file
+      character(len=*), intent(in) :: instead !! what is told of a sweep
+      type(input_texts), intent(out) :: input
+      type(case_config), intent(out) :: config
+      type(error_type), allocatable, intent(out) :: error
+
+      call read_input_texts(file, input, error)
+      if (allocated(error)) return
+      if (input%is_sweep) then
+         call raise(error, file//': is a sweep; '//instead, exit_bad_input)
+      else
+         call parse_case(input%text, input%name, config, error)
+      end if
+   end subroutine read_one_case
 
    !> The result must not take the place of the case.
    subroutine refuse_input(path, input, error)
@@ -128,13 +138,7 @@ contains
       type(input_texts) :: input
       character(len=:), allocatable :: path
 
-      call read_input_texts(options%file, input, error)
-      if (allocated(error)) return
-      if (input%is_sweep) then
-         call raise(error, options%file//': is a sweep; modes are those of one case', exit_bad_input)
-         return
-      end if
-      call parse_case(input%text, input%name, config, error)
+      call read_one_case(options%file, 'modes are those of one case', input, config, error)
       if (allocated(error)) return
       path = base_name(options%file)//'_modes.h5'
       if (allocated(options%output)) path = options%output
@@ -161,19 +165,10 @@ contains
       else ! numbers may be finite, and what follows from them not
          call parse_case(input%text, input%name, config, error)
          if (.not. allocated(error)) call new_scene(scene, config, error)
-         if (.not. allocated(error)) call refuse_steps(options, config, error)
+         if (.not. allocated(error)) call check_steps(config, scene, options%file, error)
       end if
       if (.not. allocated(error) .and. .not. options%quiet) call print_text(options%file//': valid', error)
    end subroutine check_command
-
-   !> Steps that no method can take, told with the name of the file.
-   subroutine refuse_steps(options, config, error)
-      type(options_type), intent(in) :: options
-      type(case_config), intent(in) :: config
-      type(error_type), allocatable, intent(out) :: error
-      call check_steps(config, error)
-      if (allocated(error)) error%message = options%file//': '//error%message
-   end subroutine refuse_steps
 
    !> rodyn sweep
    subroutine sweep_command(options, exit_code, error)
@@ -235,20 +230,14 @@ contains
       kind = 'run'
       if (command_argument_count() > 1) kind = argument(2)
       select case (kind)
-      case ('run')
+      case ('run', 'sweep')
          if (command_argument_count() > 2) then
             call raise(error, "rodyn defaults: '"//argument(3)//"' is too much", exit_bad_input)
             return
          end if
-         text = default_case()
+         if (kind == 'run') text = default_case()
+         if (kind == 'sweep') text = default_sweep()
          call print_text(text(:len(text) - 1), error) ! its last newline is print_text's
-      case ('sweep')
-         if (command_argument_count() > 2) then
-            call raise(error, "rodyn defaults: '"//argument(3)//"' is too much", exit_bad_input)
-            return
-         end if
-         text = default_sweep()
-         call print_text(text(:len(text) - 1), error)
       case ('--help', '-h')
          call print_text(help_text('defaults'), error)
       case default

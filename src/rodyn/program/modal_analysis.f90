@@ -74,9 +74,7 @@ contains
       real(wp), allocatable :: y(:)
 
       if (.not. (loads .or. equilibrium)) call new_load_set(motion%dynamics%scene%loads, [load_config ::], config%t_end)
-      associate (switches => motion%dynamics%scene%loads%switches)
-         call motion%dynamics%set_regime(0.0_wp, minval([switches, config%t_end]))
-      end associate
+      call motion%dynamics%set_regime(0.0_wp, minval([motion%dynamics%scene%switches, config%t_end]))
       call initial_state(motion, config%initial, y)
       if (equilibrium) call find_equilibrium(motion, 0.0_wp, y, error)
       if (.not. allocated(error)) call new_linear_model(model, motion, 0.0_wp, y, error)

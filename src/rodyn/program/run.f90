@@ -44,7 +44,7 @@ contains
    !> Run a case and write its file. On failure of the integration the file holds all rows until then, with
    !> status 'failed'; on refused input nothing is written. A run that is asked to stop (see `watch_signals`) leaves
    !> its rows in `path`.stopped, so that the same call can be made again.
-   subroutine run_case(config, path, error, input_text, force, quiet, load)
+   subroutine run_case(config, path, error, input_text, force, quiet, load, name)
       type(case_config), intent(in) :: config
       character(len=*), intent(in) :: path                 !! of the HDF5 file
       type(error_type), allocatable, intent(out) :: error
@@ -52,6 +52,7 @@ contains
       logical, intent(in), optional :: force               !! replace an existing file
       logical, intent(in), optional :: quiet               !! print nothing
       class(user_load), target, intent(inout), optional :: load !! forces of the caller's, beside those of the case
+      character(len=*), intent(in), optional :: name       !! of the case, for what is refused of its keys
       type(scene_type) :: scene
       type(motion_type), target :: motion
       type(recorder_type) :: recorder
@@ -83,6 +84,7 @@ contains
       progress = new_progress(0.0_wp, config%t_end, silent)
       call choose_method(choice, config%solver, options_of(config), scene, y(:motion%n_controlled), config%t_end, progress)
       call check_fixed_step(choice%method, choice%options, scene, y, config%t_end, error)
+      if (allocated(error) .and. present(name)) error%message = name//': '//error%message
       if (allocated(error)) return
       header%notes = notes_on(scene, y(:scene%n_dof), config%output%ledger)
       if (.not. silent) then
@@ -133,19 +135,20 @@ contains
    end subroutine run_case
 
    !> What `run_case` would refuse of the steps of a case, exit code 2: see `rodyn_step_limit`.
-   subroutine check_steps(config, error)
+   subroutine check_steps(config, scene, name, error)
       type(case_config), intent(in) :: config
+      type(scene_type), intent(in) :: scene !! the case, compiled
+      character(len=*), intent(in) :: name  !! of the case
       type(error_type), allocatable, intent(out) :: error
-      type(scene_type) :: scene
       type(motion_type) :: motion
       real(wp), allocatable :: y(:)
 
       if (.not. config%solver%fixed_step > 0.0_wp) return
-      call new_scene(scene, config, error)
-      if (.not. allocated(error)) call new_motion(motion, scene, .false., error)
+      call new_motion(motion, scene, .false., error)
       if (allocated(error)) return
       call initial_state(motion, config%initial, y)
       call check_fixed_step(trim(config%solver%method), options_of(config), scene, y, config%t_end, error)
+      if (allocated(error)) error%message = name//': '//error%message
    end subroutine check_steps
 
    !> Take down one row.

@@ -59,6 +59,7 @@ contains
       end do
    end subroutine new_kink_set
 
+   !> One program as it is given, a table with its spline.
    subroutine new_program(program, given)
       type(kink_program), intent(out) :: program
       type(kink_config), intent(in) :: given

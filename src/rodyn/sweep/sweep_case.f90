@@ -26,6 +26,7 @@ module rodyn_sweep_case
    use rodyn_step_limit, only: check_fixed_step
    use rodyn_sweep_plan, only: sweep_plan
    use rodyn_validity, only: validity_type, new_validity
+   use rodyn_text, only: short_text
    implicit none (type, external)
    private
    public :: case_result, case_shape, pulse_type, keeper_type, build_case, build_values, new_case_shape
@@ -393,7 +394,7 @@ contains
       kept%status = status_failed
       kept%message = error%message
       if (late) then
-         kept%message = 'case_seconds = '//short(sweep%case_seconds)//' s exceeded'
+         kept%message = 'case_seconds = '//short_text(sweep%case_seconds)//' s exceeded'
       else if (error%exit_code == exit_stopped) then
          kept%status = status_stopped
       end if
@@ -518,14 +519,5 @@ contains
       requested = real(now - self%clock_start, wp) > self%limit*real(rate, wp)
       self%late = requested
    end function stop_requested
-
-   !> A number for a message.
-   pure function short(x) result(text)
-      real(wp), intent(in) :: x
-      character(len=:), allocatable :: text
-      character(len=16) :: digits
-      write (digits, '(g0.6)') x
-      text = trim(adjustl(digits))
-   end function short
 
 end module rodyn_sweep_case

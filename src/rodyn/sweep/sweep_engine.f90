@@ -141,14 +141,24 @@ contains
       if (engine%ranks%rank > 0 .and. allocated(error)) error%exit_code = exit_code
    end subroutine agree_on_end
 
+   !> A failure of the first rank is one of all, with its exit code, but told by the first alone.
+   subroutine share_fault(engine, error)
+      type(engine_type), intent(inout) :: engine
+      type(error_type), allocatable, intent(inout) :: error !! in: allocated on the first rank only
+      integer(i8) :: fault
+
+      fault = exit_done
+      if (allocated(error)) fault = error%exit_code
+      call engine%ranks%share_word(fault)
+      if (fault /= exit_done .and. .not. allocated(error)) call raise(error, '', int(fault))
+   end subroutine share_fault
+
    !> The first rank reads the files, and all have the texts.
    subroutine read_input(engine, error)
       type(engine_type), intent(inout) :: engine
       type(error_type), allocatable, intent(out) :: error
       type(input_texts) :: input
-      integer(i8) :: fault
 
-      fault = exit_done
       if (engine%ranks%rank == 0) then
          call read_input_texts(engine%options%file, input, error)
          if (.not. allocated(error) .and. .not. input%is_sweep) & ! says what is missing
@@ -159,13 +169,9 @@ contains
                        'try srun --mpi=pmix, or --shard', exit_bad_input)
          if (engine%ranks%count > 1 .and. engine%options%n_shards > 0 .and. .not. allocated(error)) &
             call raise(error, '--shard is for single processes; ranks of MPI share the cases by themselves', exit_bad_input)
-         if (allocated(error)) fault = error%exit_code
       end if
-      call engine%ranks%share_word(fault)
-      if (fault /= exit_done) then
-         if (.not. allocated(error)) call raise(error, '', int(fault))
-         return
-      end if
+      call share_fault(engine, error)
+      if (allocated(error)) return
       call engine%ranks%share_text(input%text)
       call engine%ranks%share_text(input%name)
       call engine%ranks%share_text(input%base_text)
@@ -207,9 +213,8 @@ contains
       type(notice_list) :: notices
       character(len=:), allocatable :: path
       character(len=16) :: number
-      integer(i8) :: fault, ignored, number_of_shard
+      integer(i8) :: ignored, number_of_shard
 
-      fault = exit_done
       if (engine%ranks%rank == 0) then
          path = engine%options%output
          write (number, '(a, i6.6)') 'r', 0
@@ -221,13 +226,9 @@ contains
                                                      other_shards(engine%options), .false., notices, error)
          if (.not. allocated(error)) call list_todo(engine, index)
          call tell_start(engine, notices, error)
-         if (allocated(error)) fault = error%exit_code
       end if
-      call engine%ranks%share_word(fault)
-      if (fault /= exit_done) then
-         if (.not. allocated(error)) call raise(error, '', int(fault))
-         return
-      end if
+      call share_fault(engine, error)
+      if (allocated(error)) return
       call engine%ranks%share_text(path)
       call engine%ranks%share_integers(engine%todo)
       call engine%ranks%share_integers(engine%attempt)

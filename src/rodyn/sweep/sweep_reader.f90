@@ -8,7 +8,7 @@ module rodyn_sweep_reader
    use rodyn_case_config, only: case_config, name_length
    use rodyn_case_reader, only: case_from_document
    use rodyn_case_schema, only: case_groups, case_rows
-   use rodyn_checked_document, only: checked_document, blame, entry_of, instances, is_sound, match_document
+   use rodyn_checked_document, only: checked_document, blame, entry_of, instances, is_given, is_sound, match_document
    use rodyn_defaults_text, only: defaults_text
    use rodyn_document_checks, only: check_document
    use rodyn_errors, only: error_type
@@ -122,7 +122,7 @@ contains
       call loader%field('frequencies', sweep%frequencies)
       call loader%field('integrate', sweep%integrate)
       call loader%close_group()
-      if (base_is_sound .and. entry_of(checked, 'sweep', 1, 'probe_times', any_state=.true.) == 0) &
+      if (base_is_sound .and. .not. is_given(checked, 'sweep', 1, 'probe_times')) &
          sweep%probe_times = [sweep%base_case%t_end]
       do i = 2, size(sweep%probe_times)
          if (sweep%probe_times(i) > sweep%probe_times(i - 1)) cycle
@@ -207,7 +207,7 @@ contains
 
       logical function given(key)
          character(len=*), intent(in) :: key
-         given = entry_of(checked, 'axis', i, key, any_state=.true.) > 0
+         given = is_given(checked, 'axis', i, key)
       end function given
 
       pure function range_keys(k) result(key)

@@ -1,0 +1,52 @@
+!> Jacobi's rotations, which make elements of a symmetric matrix zero one by one (Golub & Van Loan, Matrix Computations,
+!> sec. 8.5).
+module rodyn_jacobi_rotation
+   use rodyn_kinds, only: wp
+   implicit none (type, external)
+   private
+   public :: jacobi_rotation, rotate_columns, rotate_rows
+
+contains
+
+   !> Cosine and sine of the smaller rotation of rows and columns i and j after which h(i, j) is zero.
+   pure subroutine jacobi_rotation(h, i, j, c, s)
+      real(wp), contiguous, intent(in) :: h(:, :) !! symmetric
+      integer, intent(in) :: i, j                 !! h(i, j) is not zero
+      real(wp), intent(out) :: c, s
+      real(wp) :: theta, t
+
+      theta = 0.5_wp*(h(j, j) - h(i, i))/h(i, j)
+      t = sign(1.0_wp, theta)/(abs(theta) + hypot(1.0_wp, theta))
+      c = 1.0_wp/hypot(1.0_wp, t)
+      s = t*c
+   end subroutine jacobi_rotation
+
+   !> Columns i and j become c x_i - s x_j and s x_i + c x_j.
+   pure subroutine rotate_columns(x, i, j, c, s)
+      real(wp), contiguous, intent(inout) :: x(:, :)
+      integer, intent(in) :: i, j
+      real(wp), intent(in) :: c, s
+      real(wp) :: before
+      integer :: k
+      do k = 1, size(x, 1)
+         before = x(k, i)
+         x(k, i) = c*before - s*x(k, j)
+         x(k, j) = s*before + c*x(k, j)
+      end do
+   end subroutine rotate_columns
+
+   !> Rows likewise.
+   pure subroutine rotate_rows(x, i, j, c, s)
+      real(wp), contiguous, intent(inout) :: x(:, :)
+      integer, intent(in) :: i, j
+      real(wp), intent(in) :: c, s
+      real(wp) :: before
+      integer :: k
+      do k = 1, size(x, 2)
+         before = x(i, k)
+         x(i, k) = c*before - s*x(j, k)
+         x(j, k) = s*before + c*x(j, k)
+      end do
+   end subroutine rotate_rows
+
+end module rodyn_jacobi_rotation

@@ -1,0 +1,57 @@
+!> Rules of laws in time, of loads and of driven kinks alike.
+module rodyn_law_rules
+   use rodyn_kinds, only: wp
+   use rodyn_checked_document, only: checked_document, blame, entry_of, is_given, is_sound, require
+   use rodyn_text, only: short_text, to_text
+   implicit none (type, external)
+   private
+   public :: check_law_keys, check_table
+
+contains
+
+   !> Each law has its own keys and takes no others.
+   subroutine check_law_keys(checked, group, i, law, keys, takes, needs)
+      type(checked_document), intent(inout) :: checked
+      character(len=*), intent(in) :: group
+      integer, intent(in) :: i !! which of these groups
+      character(len=*), intent(in) :: law
+      character(len=*), intent(in) :: keys(:)
+      logical, intent(in) :: takes(:), needs(:) !! does the law take the key, and has it no default?
+      character(len=:), allocatable :: key, named
+      integer :: k
+
+      if (.not. is_sound(checked, group, i, 'law')) return
+      named = "law = '"//trim(law)//"'"
+      do k = 1, size(keys)
+         key = trim(keys(k))
+         if (.not. takes(k)) then
+            if (is_given(checked, group, i, key)) call blame(checked, group, i, key, 'does not go with '//named)
+         else if (needs(k)) then
+            call require(checked, group, i, key, 'when '//named)
+         end if
+      end do
+   end subroutine check_law_keys
+
+   !> As many values as times, two at least, and times that increase.
+   subroutine check_table(checked, group, i, times, values)
+      type(checked_document), intent(inout) :: checked
+      character(len=*), intent(in) :: group
+      integer, intent(in) :: i !! which of these groups
+      real(wp), allocatable, intent(in) :: times(:)  !! [s]
+      real(wp), allocatable, intent(in) :: values(:) !! both allocated where they are given rightly
+      integer :: k
+
+      if (entry_of(checked, group, i, 'times') == 0) return
+      if (size(times) < 2) call blame(checked, group, i, 'times', 'must be two values at least')
+      do k = 2, size(times)
+         if (times(k) > times(k - 1)) cycle
+         call blame(checked, group, i, 'times', 'must increase, but value '//to_text(k)//', '//short_text(times(k))// &
+                    ', follows '//short_text(times(k - 1))//' [s]')
+         exit
+      end do
+      if (entry_of(checked, group, i, 'values') == 0) return
+      if (size(values) /= size(times)) call blame(checked, group, i, 'values', 'must be as many as times: '// &
+                                                  to_text(size(times))//', not '//to_text(size(values)))
+   end subroutine check_table
+
+end module rodyn_law_rules

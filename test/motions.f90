@@ -1,0 +1,101 @@
+!> Scenes made ready to be evaluated, and what must hold of each at any state.
+module test_motions
+   use rodyn_kinds, only: wp
+   use rodyn_errors, only: error_type
+   use rodyn_case_config, only: case_config
+   use rodyn_kinematics, only: invariants_type
+   use rodyn_motion, only: motion_type, new_motion, initial_state, state_invariants
+   use rodyn_scene, only: scene_type, new_scene
+   use test_random_scenes, only: random_case
+   use test_testing, only: check
+   implicit none (type, external)
+   private
+   public :: motion_of, random_motion, check_jacobian, check_energy_rate
+
+contains
+
+   !> A case with its initial state; loads act as they do from 0 to 1 s.
+   subroutine motion_of(motion, y, config, error, ledger)
+      type(motion_type), intent(out) :: motion
+      real(wp), allocatable, intent(out) :: y(:)
+      type(case_config), intent(in) :: config
+      type(error_type), allocatable, intent(out) :: error
+      logical, intent(in), optional :: ledger !! default .true.
+      type(scene_type) :: scene
+      logical :: with_ledger
+
+      with_ledger = .true.
+      if (present(ledger)) with_ledger = ledger
+      call new_scene(scene, config, error)
+      if (.not. allocated(error)) call new_motion(motion, scene, with_ledger, error)
+      if (allocated(error)) return
+      call motion%dynamics%set_regime(0.0_wp, 1.0_wp)
+      call initial_state(motion, config%initial, y)
+   end subroutine motion_of
+
+   !> A random scene with its initial state and loads; no load is switched within (0, 1).
+   subroutine random_motion(motion, y, which, n, kernel, error)
+      type(motion_type), intent(out) :: motion
+      real(wp), allocatable, intent(out) :: y(:)
+      integer, intent(in) :: which, n !! kind, rods
+      character(len=*), intent(in) :: kernel
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+
+      call random_case(config, which, n)
+      config%model%kernel = kernel
+      call motion_of(motion, y, config, error)
+   end subroutine random_motion
+
+   !> The Jacobian at t = 0.3 s against central differences.
+   subroutine check_jacobian(motion, y, name, error)
+      type(motion_type), intent(inout) :: motion
+      real(wp), contiguous, intent(in) :: y(:)
+      character(len=*), intent(in) :: name
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: jac(size(y), size(y)), step
+      real(wp), dimension(size(y)) :: plus, minus, yp, ym
+      logical :: ok
+      integer :: j
+
+      call motion%jacobian(0.3_wp, y, jac, ok)
+      call check(error, ok, 'no Jacobian')
+      if (allocated(error)) return
+      do j = 1, size(y)
+         step = epsilon(1.0_wp)**(1.0_wp/3.0_wp)*max(1.0_wp, abs(y(j)))
+         yp = y
+         ym = y
+         yp(j) = y(j) + step
+         ym(j) = y(j) - step
+         call motion%rhs(0.3_wp, yp, plus, ok)
+         call motion%rhs(0.3_wp, ym, minus, ok)
+         ! Truncation of central differences: step^2 relative, with margin for third derivatives.
+         call check(error, maxval(abs(jac(:, j) - (plus - minus)/(yp(j) - ym(j)))) < 1.0e-7_wp*maxval(abs(jac)), &
+                    name//': Jacobian is off')
+         if (allocated(error)) return
+      end do
+   end subroutine check_jacobian
+
+   !> d(kinetic + elastic)/dt along the motion, by central differences, equals load power - dissipated power.
+   subroutine check_energy_rate(motion, y, least_power, name, error)
+      type(motion_type), intent(inout) :: motion !! with a ledger
+      real(wp), contiguous, intent(in) :: y(:)
+      real(wp), intent(in) :: least_power        !! that differences can tell from none [W]
+      character(len=*), intent(in) :: name
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), parameter :: h = 1.0e-6_wp !! [s]
+      type(invariants_type) :: before, after
+      real(wp) :: ydot(size(y)), rate, scale
+      logical :: ok
+
+      call motion%rhs(0.3_wp, y, ydot, ok)
+      before = state_invariants(motion, y - h*ydot)
+      after = state_invariants(motion, y + h*ydot)
+      associate (power => ydot(motion%n_controlled + 1:))
+         rate = (after%kinetic + after%elastic - before%kinetic - before%elastic)/(2.0_wp*h)
+         scale = least_power + sum(abs(power)) + sum(ydot**2)*1.0e-3_wp
+         call check(error, ok .and. abs(rate - (power(1) - power(2))) < 1.0e-5_wp*scale, name//': energy does not balance')
+      end associate
+   end subroutine check_energy_rate
+
+end module test_motions
