@@ -200,9 +200,13 @@ def draw_drift() -> None:
 
     figure, panels = style.new_figure(1, 3, height=3.3, sharey=True)
     titles = {"rod": "one rigid rod", "rigid": "two rigid rods", "flexible": "one rod that bends"}
+    labels: list[str] = []  # one line style for a method in all panels
     for axes, wanted in zip(panels[0], titles, strict=True):
-        for i, (_, word, _, (periods, error)) in enumerate(run for run in drift_runs() if run[0] == wanted):
-            axes.loglog(periods, np.maximum.accumulate(abs(error)), label=word.replace(":", ", "), **style.line_style(i))
+        for _, word, _, (periods, error) in (run for run in drift_runs() if run[0] == wanted):
+            label = word.replace(":", ", ") if word.endswith("fixed") else word.partition(":")[0]
+            if label not in labels:
+                labels.append(label)
+            axes.loglog(periods, np.maximum.accumulate(abs(error)), label=label, **style.line_style(labels.index(label)))
         for power, at in ((1.0, 2e-13), (0.5, 2e-15)):
             x = np.array([1.0, 1e6])
             axes.loglog(x, at * x**power, color=style.GREY, linewidth=0.8)
