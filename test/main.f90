@@ -1,4 +1,4 @@
-!> The test program: `tester [filter]` runs every test whose name contains the filter.
+!> The test program: `tester [filter]` runs every test whose name contains the filter, `tester '!filter'` every other.
 program tester
    use test_testing, only: run_suite, suite_tally, unittest
    use test_article, only: collect_article

@@ -17,7 +17,7 @@ module test_testing
    end interface
 
    type :: unittest
-      character(len=:), allocatable :: name !! a sentence that says what holds
+      character(len=160) :: name = '' !! what holds, in words; an allocatable one would leak from array constructors (gfortran 12)
       procedure(test_interface), pointer, nopass :: test => null()
    end type unittest
 
@@ -50,29 +50,41 @@ contains
       entry%test => test
    end function new_test
 
-   !> Run the tests of a suite whose name contains `filter`, print each, and add to the tally.
+   !> Run the tests of a suite that the filter chooses, print each, and add to the tally.
    subroutine run_suite(suite_name, suite, tally, filter)
       character(len=*), intent(in) :: suite_name
       type(unittest), intent(in) :: suite(:)
       type(suite_tally), intent(inout) :: tally
-      character(len=*), intent(in) :: filter !! empty: all
+      character(len=*), intent(in) :: filter !! see `chosen`
       type(error_type), allocatable :: error
       integer :: i
 
       do i = 1, size(suite)
-         if (len(filter) > 0 .and. index(suite(i)%name, filter) == 0) cycle
+         if (.not. chosen(trim(suite(i)%name), filter)) cycle
          call suite(i)%test(error)
          if (allocated(error)) then
             tally%failed = tally%failed + 1
-            write (output_unit, '(a)') 'FAILED '//suite_name//': '//suite(i)%name
+            write (output_unit, '(a)') 'FAILED '//suite_name//': '//trim(suite(i)%name)
             write (output_unit, '(a)') '       '//error%message
          else
             tally%passed = tally%passed + 1
-            write (output_unit, '(a)') 'passed '//suite_name//': '//suite(i)%name
+            write (output_unit, '(a)') 'passed '//suite_name//': '//trim(suite(i)%name)
          end if
          flush (output_unit)
       end do
    end subroutine run_suite
+
+   !> All names without a filter, those that contain it, or after '!' those that do not.
+   pure logical function chosen(name, filter)
+      character(len=*), intent(in) :: name, filter
+      chosen = len(filter) == 0
+      if (chosen) return
+      if (filter(1:1) == '!') then
+         chosen = index(name, filter(2:)) == 0
+      else
+         chosen = index(name, filter) > 0
+      end if
+   end function chosen
 
    subroutine check_condition(error, condition, message)
       type(error_type), allocatable, intent(out) :: error

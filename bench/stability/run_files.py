@@ -38,12 +38,12 @@ def differences(one: pathlib.Path, other: pathlib.Path) -> set[str]:
     return {name for name in a.keys() | b.keys() if a.get(name) != b.get(name)}
 
 
-def largest_difference(one: pathlib.Path, other: pathlib.Path) -> tuple[float, str]:
-    """Of all series, relative to the largest value of each kind of quantity; and where it is."""
+def largest_difference(one: pathlib.Path, other: pathlib.Path, without: set[str] = frozenset()) -> tuple[float, str]:
+    """Of all series but some, relative to the largest value of each kind of quantity; and where it is."""
     worst, where = 0.0, ""
     with h5py.File(one) as a, h5py.File(other) as b:
         for name in a:
-            if not isinstance(a[name], h5py.Dataset) or a[name].dtype.kind != "f" or name == "energy_residual":
+            if not isinstance(a[name], h5py.Dataset) or a[name].dtype.kind != "f" or name in without | {"energy_residual"}:
                 continue
             x, y = a[name][()], b[name][()]
             if x.shape != y.shape:

@@ -197,6 +197,14 @@ def test_names_that_are_not_utf8(place):
     assert (place / f"{name}.h5").exists()
 
 
+def test_messages_are_utf8_whatever_they_name(place):
+    (place / "sweep.nml").write_bytes(b"&sweep base = '\xff\xc3.nml' /\n&axis key = 'case.t_end', values = 1 /\n")
+    for arguments in (["check", "sweep.nml"], ["run", os.fsdecode(b"\xfe\xd0\xb6")]):
+        result = subprocess.run([RODYN, *arguments], cwd=place, capture_output=True)
+        assert result.returncode == 2
+        assert "cannot be read" in result.stderr.decode() and b"?" in result.stderr
+
+
 def test_paths_of_four_thousand_characters(place):
     part = "d" * 200
     deep = place
@@ -394,7 +402,10 @@ def test_no_signal_and_no_full_disk_leaves_a_file_that_looks_complete(tmp_path):
     for _ in range(8):
         assert trials.signalled(signal.SIGKILL, rng.uniform(0, trials.seconds)) == ""
         assert trials.signalled(signal.SIGTERM, rng.uniform(0, trials.seconds)) == ""
-        assert trials.full(rng.randrange(1, size)) == ""
+        assert trials.limited(rng.randrange(1, size)) == ""
+        if faults.may_mount():
+            assert trials.full(faults.DISK_SIZE, rng.uniform(0, trials.seconds)) == ""
+            assert trials.full(rng.randrange(4096, size), trials.seconds) == ""
 
 
 def test_too_little_address_space_is_told_not_suffered(place):

@@ -5,7 +5,7 @@ module rodyn_text
    implicit none (type, external)
    private
    public :: lower, is_name, is_digit
-   public :: to_text, short_text, quoted, printable, ends_with
+   public :: to_text, short_text, quoted, printable, as_utf8, ends_with
    public :: edit_distance, word_count, word
 
    !> A number as the shortest text (integer), or with 17 significant digits (real), or as T or F.
@@ -105,13 +105,25 @@ contains
             clean = clean(:i - 1)
          end do
       end if
-      i = first_bad_byte(clean)
-      do while (i > 0)
-         clean(i:i) = '?'
-         i = first_bad_byte(clean)
-      end do
+      clean = as_utf8(clean)
       if (len(text) > limit) clean = clean//'...'
    end function printable
+
+   !> A message of several lines may name files as their bytes are; what of it is no UTF-8 becomes '?'.
+   pure function as_utf8(text) result(clean)
+      character(len=*), intent(in) :: text
+      character(len=:), allocatable :: clean
+      integer :: start, bad
+
+      clean = text
+      start = 1
+      do
+         bad = first_bad_byte(clean(start:))
+         if (bad == 0) exit
+         start = start + bad
+         clean(start - 1:start - 1) = '?'
+      end do
+   end function as_utf8
 
    !> Levenshtein distance: insertions, deletions and substitutions of one character.
    pure integer function edit_distance(a, b) result(distance)

@@ -81,6 +81,7 @@ contains
       self%temporary_path = free_temporary_name(path)
       self%force = force
       call self%file%create(self%temporary_path, error)
+      if (allocated(error)) call self%discard() ! on a full disk it is there, empty
    end subroutine begin
 
    !> Root attributes: what ran, with what, on what.

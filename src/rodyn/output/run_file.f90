@@ -5,8 +5,8 @@
 !>     call run%append(row, error)                     ! once per output time
 !>     call run%finish('done', report, error)
 !>
-!> Until `finish`, the file has a temporary name (`rodyn_result_file`). After a failure to write, it is removed and the type
-!> is as before `create`.
+!> Until `finish`, the file has a temporary name (`rodyn_result_file`). After a failure to write, it is removed, and every
+!> later call tells of that failure again, so that the caller may end its work in the usual way.
 module rodyn_run_file
    use rodyn_errors, only: error_type, raise
    use rodyn_kinds, only: i8, wp
@@ -96,6 +96,7 @@ module rodyn_run_file
       integer, private :: waiting = 0                  !! rows in the columns
       integer(i8), private :: n_rows = 0_i8            !! rows appended so far
       real(wp), private :: last_time = 0.0_wp          !! of the last row [s]
+      character(len=:), allocatable, private :: lost   !! why the file was given up
       type(column), private :: columns(n_run_variables)
    contains
       procedure :: create
@@ -103,6 +104,8 @@ module rodyn_run_file
       procedure :: write_events
       procedure :: finish
       procedure :: redirect
+      procedure, private :: check_open
+      procedure, private :: give_up
       procedure, private :: write_layout
       procedure, private :: write_solver_report
       procedure, private :: write_waiting_rows
@@ -160,6 +163,7 @@ contains
       self%waiting = 0
       self%n_rows = 0_i8
       self%last_time = 0.0_wp
+      if (allocated(self%lost)) deallocate (self%lost)
       do i = 1, n_run_variables
          used = self%ledger .or. .not. run_variables(i)%ledger
          if (i == i_bubble .or. i == i_bubble_rate) used = self%bubbles
@@ -171,8 +175,29 @@ contains
       call self%write_layout(header%compression, error)
       if (.not. allocated(error)) call self%write_provenance(header%provenance, error)
       if (.not. allocated(error)) call self%file%flush(error)
-      if (allocated(error)) call self%discard()
+      if (allocated(error)) call self%give_up(error)
    end subroutine create
+
+   !> An error where there is no file to write to.
+   subroutine check_open(self, error)
+      class(run_file), intent(in) :: self
+      type(error_type), allocatable, intent(out) :: error
+
+      if (self%file%is_open()) return
+      if (allocated(self%lost)) then
+         call raise(error, self%lost)
+      else
+         call raise(error, 'a run file that is not open cannot be written')
+      end if
+   end subroutine check_open
+
+   !> Remove what cannot be written, and keep in mind why.
+   subroutine give_up(self, error)
+      class(run_file), intent(inout) :: self
+      type(error_type), intent(in) :: error
+      call self%discard()
+      self%lost = error%message
+   end subroutine give_up
 
    !> Add one row. It is copied; blocks of rows are written as they fill.
    subroutine append(self, row, error)
@@ -180,10 +205,8 @@ contains
       type(run_row), intent(in) :: row
       type(error_type), allocatable, intent(out) :: error
 
-      if (.not. self%file%is_open()) then
-         call raise(error, 'a row was given to a run file that is not open')
-         return
-      end if
+      call self%check_open(error)
+      if (allocated(error)) return
       self%waiting = self%waiting + 1
       self%n_rows = self%n_rows + 1_i8
       self%last_time = row%time
@@ -219,7 +242,7 @@ contains
       if (self%waiting < self%block_rows) return
       call self%write_waiting_rows(error)
       if (.not. allocated(error)) call self%file%flush(error)
-      if (allocated(error)) call self%discard()
+      if (allocated(error)) call self%give_up(error)
    end subroutine append
 
    !> The group `events` of a run that may have some, before `finish`. Without events its data sets are empty.
@@ -237,6 +260,8 @@ contains
          'hinge, counted from the spacecraft', 'what happened', 'mechanical energy lost in it']
       integer :: i
 
+      call self%check_open(error)
+      if (allocated(error)) return
       call self%file%create_group(events_group, error)
       if (.not. allocated(error)) call self%file%write('events/time', time, 0, error)
       if (.not. allocated(error)) call self%file%make_scale('events/time', error)
@@ -248,7 +273,7 @@ contains
          if (.not. allocated(error)) call self%describe(trim(names(i)), trim(units(i)), trim(meanings(i)), error)
          if (i > 1 .and. .not. allocated(error)) call self%file%attach_scale(trim(names(i)), 1, 'events/time', error)
       end do
-      if (allocated(error)) call self%discard()
+      if (allocated(error)) call self%give_up(error)
    end subroutine write_events
 
    !> Write what waits, the final attributes, and give the file its final name.
@@ -259,17 +284,15 @@ contains
       type(error_type), allocatable, intent(out) :: error
       character(len=*), intent(in), optional :: message  !! why it is not done
 
-      if (.not. self%file%is_open()) then
-         call raise(error, 'a run file that is not open cannot be finished')
-         return
-      end if
+      call self%check_open(error)
+      if (allocated(error)) return
       call self%write_waiting_rows(error)
       if (.not. allocated(error)) call self%write_solver_report(report, error)
       if (.not. allocated(error)) call self%file%put_attribute('/', 't_reached', self%last_time, error)
       if (.not. allocated(error)) call self%file%put_attribute('/', 'warnings', text_or_empty(report%warnings), error)
       if (.not. allocated(error) .and. present(message)) call self%file%put_attribute('/', 'message', message, error)
       if (allocated(error)) then
-         call self%discard()
+         call self%give_up(error)
       else
          call self%complete(status, error)
       end if

@@ -13,6 +13,7 @@ module rodyn_command_line
    use rodyn_sweep_config, only: sweep_config
    use rodyn_sweep_engine, only: run_sweep, sweep_options
    use rodyn_sweep_reader, only: default_sweep, parse_sweep
+   use rodyn_text, only: as_utf8
    use rodyn_build_info, only: program_version, git_commit
    implicit none (type, external)
    private
@@ -75,7 +76,7 @@ contains
       end select
       exit_code = exit_done
       if (.not. allocated(error)) return
-      write (error_unit, '(a)') error%message
+      write (error_unit, '(a)') as_utf8(error%message)
       exit_code = error%exit_code
    end subroutine run_command
 

@@ -25,7 +25,7 @@ module rodyn_sweep_engine
    use rodyn_sweep_result, only: result_is_sound, write_result
    use rodyn_sweep_worker, only: case_feed, lanes_text, run_cases, uses_lanes
    use rodyn_sweep_writer, only: shard_writer
-   use rodyn_text, only: to_text
+   use rodyn_text, only: as_utf8, to_text
    implicit none (type, external)
    private
    public :: run_sweep, sweep_options
@@ -238,7 +238,7 @@ contains
          engine%tag = trim(number)
          call engine%directory%lock_rank(path, engine%ranks%rank, error)
          if (allocated(error)) then ! the other ranks must hear of it, or they would wait for this one
-            write (error_unit, '(a)') error%message
+            write (error_unit, '(a)') as_utf8(error%message)
             ignored = engine%ranks%add(at_errors, 1)
             deallocate (error)
             engine%todo = engine%todo(:0)
@@ -313,7 +313,7 @@ contains
       integer :: i
 
       do i = 1, notices%n
-         write (error_unit, '(a)') engine%options%output//': '//trim(notices%text(i))
+         write (error_unit, '(a)') as_utf8(engine%options%output//': '//trim(notices%text(i)))
       end do
       if (allocated(error)) return
       call engine%progress%start(status_name(engine), engine%options%quiet)
