@@ -181,7 +181,7 @@ contains
       do a = 1, size(sweep%axes)
          associate (axis => sweep%axes(a))
             if (is_ratio(axis)) cycle
-            call set_value(document, trim(axis%key), value_text(axis, rows(axis%dimension)), error)
+            call set_value(document, trim(axis%key), value_text(axis, rows(axis%dimension)), error, axis%in_list)
             if (allocated(error)) return
             if (axis%key /= 'model.inertia' .or. any(sweep%axes%key == 'model.bending')) cycle
             call follow_inertia(document, trim(sweep%base_case%model%bending), axis%texts(rows(axis%dimension)), error)

@@ -20,6 +20,7 @@ module rodyn_sweep_config
       logical :: textual = .false.                    !! `texts`, otherwise `numbers`
       logical :: whole = .false.                      !! the numbers are integers
       logical :: bare = .false.                       !! the texts stand without quotes: .true., .false.
+      logical :: in_list = .false.                    !! the key is a list, as long as the base has it
       real(wp), allocatable :: numbers(:)
       character(len=:), allocatable :: texts(:)
       character(len=12) :: unit = ''

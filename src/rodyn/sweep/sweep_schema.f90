@@ -29,7 +29,7 @@ module rodyn_sweep_schema
       schema_row('sweep', 'integrate', type_logical, default='.true.', &
          help='false: only the frequencies are computed'), &
       schema_row('axis', 'key', type_text, rule=up_to, high=80.0_wp, example="'mass_ratio'", &
-         help='group.name as in a case, with (3) for one element; or mass_ratio, of all nodes to all rods'), &
+         help='group.name, group.name(3) for one element, load(2).name for the second &load; or mass_ratio'), &
       schema_row('axis', 'values', type_real, any_list, default='depends', example='2, 4, 8', &
          when='this, text_values, or start to count', help='numbers'), &
       schema_row('axis', 'text_values', type_text, any_list, default='depends', &
