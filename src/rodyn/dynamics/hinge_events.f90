@@ -41,6 +41,7 @@ module rodyn_hinge_events
    contains
       procedure :: margins
       procedure :: begin
+      procedure :: adopt
       procedure :: respond
       procedure :: release_due
       procedure :: settle
@@ -143,6 +144,35 @@ contains
       end do
       call dynamics%change_hinges()
    end subroutine begin
+
+   !> Choose the laws anew at a state to which no motion led; what is locked stays so. An equilibrium beyond a latch is none.
+   subroutine adopt(self, dynamics, t, q, p, changed, error)
+      class(event_set), intent(inout) :: self
+      type(dynamics_type), intent(inout) :: dynamics
+      real(wp), intent(in) :: t, q(:), p(:)
+      logical, intent(out) :: changed !! some hinge has another law
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), dimension(0:dynamics%scene%n - 1) :: stiffness, constant ! of T = C th + constant at rest
+      integer :: i
+
+      call find_joints(self, dynamics, t, q, p)
+      stiffness = dynamics%scene%hinges%stiffness
+      constant = dynamics%scene%hinges%constant + dynamics%scene%hinges%friction
+      do i = 1, size(dynamics%scene%hinges%mechanisms)
+         associate (mechanism => dynamics%scene%hinges%mechanisms(i))
+            if (mechanism%is_constrained()) cycle
+            associate (theta => self%theta(mechanism%hinge), rate => self%theta_rate(mechanism%hinge))
+               call mechanism%settle(theta, rate)
+               if (mechanism%margin(part_latch, t, theta, rate) < 0.0_wp) call raise(error, &
+                  'no equilibrium: hinge '//to_text(mechanism%hinge)//' latches before the chain comes to rest')
+            end associate
+         end associate
+         if (allocated(error)) return
+      end do
+      call dynamics%change_hinges(error)
+      changed = any(abs(stiffness - dynamics%scene%hinges%stiffness) > 0.0_wp) .or. &
+                any(abs(constant - (dynamics%scene%hinges%constant + dynamics%scene%hinges%friction)) > 0.0_wp)
+   end subroutine adopt
 
    !> Change the laws whose margins became negative. The rates p change if a hinge becomes a constraint.
    subroutine respond(self, dynamics, t, q, p, crossed, lost, error)
