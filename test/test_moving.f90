@@ -52,6 +52,7 @@ contains
                new_test('a hold released at t0 goes on as a run that starts there', test_release), &
                new_test('a held chain is one rigid body', test_held_body), &
                new_test('a lock is the limit of a stiff spring', test_stiff_lock), &
+               new_test('locks beside exact dampers are limits of stiff springs, and of weak dampers', test_exact_locks), &
                new_test('hinges deploy one after the other, in every kind of scene, and energy balances', test_sequence), &
                new_test('loads written by a user do what the same loads of a case do, by every method', test_written_loads), &
                new_test('feedback of a user holds the attitude as its closed form says', test_feedback), &
@@ -718,7 +719,6 @@ contains
       call random_case(config, which, 3)
       deallocate (config%loads)
       allocate (config%loads(0), config%hinges(0), config%kink_programs(0))
-      config%model%dampers = 'reduced'
       config%chain%bending_stiffness = 500.0_wp
       config%chain%hinge_stiffness = 100.0_wp
       config%chain%kink = 0.0_wp
@@ -757,6 +757,7 @@ contains
          if (allocated(error)) return
          call check_close(error, held%rows(2)%phi, [0.0_wp, 0.0_wp, 0.0_wp], 1.0e-12_wp, kind_name(which)//': held')
          if (allocated(error)) return
+         if (config%model%dampers == 'exact') cycle ! a run that starts with balanced dampers is another motion
          config%hinges(1)%held = .false.
          call integrate(config, [0.0_wp, 0.6_wp], free, error)
          if (allocated(error)) return
@@ -821,6 +822,56 @@ contains
       end do
       call check(error, miss(1) > 1.0e-6_wp .and. miss(2) < 0.02_wp*miss(1), 'the difference does not fall as 1/C')
    end subroutine test_stiff_lock
+
+   !> A held hinge, released under load, which then latches, each hinge with a damper whose rotation is a state. As a constraint
+   !> against springs C (differences fall with 1/C); and against reduced dampers, whose joints jump where these creep (with D).
+   subroutine test_exact_locks(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config, weak
+      type(trajectory) :: exact, other
+      real(wp) :: miss(2)
+      integer :: i
+
+      call seed_random(27)
+      call held_case(config, 7)
+      call check(error, trim(config%model%dampers), 'exact', 'kind')
+      if (allocated(error)) return
+      config%chain%hinge_damping = 2.0_wp
+      config%initial%omega = 0.0_wp
+      config%hinges(1)%release_time = 0.1_wp
+      config%hinges(1)%latch_angle = 0.1_wp
+      config%hinges(1)%rest_angle = 0.0_wp
+      deallocate (config%loads)
+      allocate (config%loads(1))
+      config%loads(1)%target = 'node'
+      config%loads(1)%component = 'Y'
+      config%loads(1)%node = 3
+      config%loads(1)%value = 40.0_wp
+      config%solver%method = 'bdf'
+      call integrate(config, [0.0_wp, 1.0_wp], exact, error)
+      if (allocated(error)) return
+      call check(error, exact%n_events, 2, 'released and latched')
+      if (allocated(error)) return
+      do i = 1, 2
+         weak = config
+         weak%hinges(1)%lock_stiffness = 10.0_wp**(4 + i)
+         call integrate(weak, [0.0_wp, 1.0_wp], other, error)
+         if (allocated(error)) return
+         miss(i) = maxval(abs(other%rows(2)%phi - exact%rows(2)%phi))
+      end do
+      call check(error, miss(1) > 1.0e-6_wp .and. abs(miss(1)/miss(2) - 10.0_wp) < 2.0_wp, 'the difference does not fall as 1/C')
+      if (allocated(error)) return
+      do i = 1, 2
+         config%chain%hinge_damping = 10.0_wp**(-i)
+         config%model%dampers = 'exact'
+         call integrate(config, [0.0_wp, 1.0_wp], exact, error)
+         config%model%dampers = 'reduced'
+         if (.not. allocated(error)) call integrate(config, [0.0_wp, 1.0_wp], other, error)
+         if (allocated(error)) return
+         miss(i) = maxval(abs(other%rows(2)%phi - exact%rows(2)%phi))
+      end do
+      call check(error, miss(1) > 1.0e-6_wp .and. abs(miss(1)/miss(2) - 10.0_wp) < 3.0_wp, 'the difference does not fall with D')
+   end subroutine test_exact_locks
 
    !> Three hinges: the first latches and releases the second, which latches and releases the third, which latches.
    subroutine test_sequence(error)

@@ -23,7 +23,8 @@ module rodyn_equilibrium
 
    !> LU factors of the chain's part of the Jacobian, without angles that locks make redundant.
    type :: newton_solver
-      integer, allocatable :: kept(:) !! the chain's coordinates that are left, without those of relaxing hinges
+      integer, allocatable :: kept(:) !! the chain's coordinates that are left, and rotations of relaxing hinges: places in q
+      integer, allocatable :: rows(:) !! their equations: places in y'
       real(wp), allocatable :: lu(:, :), scale(:)
       integer, allocatable :: pivots(:)
    end type newton_solver
@@ -107,19 +108,22 @@ contains
       real(wp), intent(in) :: jac(:, :)
       logical, intent(out) :: ok
       real(wp), allocatable :: expansion(:, :)
+      integer, allocatable :: chain(:), joints(:)
       integer :: i, info, n
 
       associate (b => motion%dynamics%scene%n_base, r => motion%n_q, m => motion%n_dof, scene => motion%dynamics%scene)
-         solver%kept = free_coordinates(scene)
-         solver%kept = solver%kept(b + 1:)
-         n = size(solver%kept) + r - m
-         if (.not. allocated(solver%lu)) allocate (solver%lu(n, n), solver%pivots(n))
+         chain = free_coordinates(scene)
+         chain = chain(b + 1:)
+         joints = m + pack([(i, i=1, r - m)], .not. scene%hinges%locked(scene%hinges%relaxing))
+         solver%kept = [chain, joints]
+         solver%rows = [r + chain, joints]
+         n = size(solver%kept)
+         if (.not. allocated(solver%pivots)) allocate (solver%pivots(n))
          if (has_slaves(scene)) then ! and no relaxing hinges
             expansion = expansion_matrix(scene)
-            solver%lu(:, :) = matmul(jac(r + solver%kept, 1:m), expansion(:, b + 1:))
+            solver%lu = matmul(jac(solver%rows, 1:m), expansion(:, b + 1:))
          else
-            solver%lu(1:m - b, :) = jac(r + b + 1:r + m, b + 1:r)
-            solver%lu(m - b + 1:, :) = jac(m + 1:r, b + 1:r)
+            solver%lu = jac(solver%rows, solver%kept)
          end if
       end associate
       solver%scale = maxval(abs(solver%lu), dim=2)
@@ -147,14 +151,13 @@ contains
       n = size(solver%scale)
       call motion%rhs(t, y, rate, ok)
       associate (b => motion%dynamics%scene%n_base, r => motion%n_q, m => motion%n_dof, scene => motion%dynamics%scene)
-         step = -[rate(r + solver%kept), rate(m + 1:r)]/solver%scale
+         step = -rate(solver%rows)/solver%scale
          if (ok .and. n > 0) call dgetrs('N', n, 1, solver%lu, n, solver%pivots, step, n, info)
          if (ok .and. n > 0) ok = info == 0 .and. all(abs(step) <= huge(step))
-         if (.not. has_slaves(scene)) return
          whole = 0.0_wp
          whole(solver%kept) = step
          still = 0.0_wp
-         call expand(scene, scene%hinges%locked, still, whole)
+         if (has_slaves(scene)) call expand(scene, scene%hinges%locked, still, whole)
          step = whole(b + 1:)
       end associate
    end subroutine newton_step

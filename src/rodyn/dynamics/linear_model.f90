@@ -22,7 +22,7 @@ module rodyn_linear_model
    type :: linear_model
       integer :: n_base = 0                  !! unknowns of the spacecraft: 3 or 0; the first of those that are kept
       integer :: n = 0                       !! coordinates that no lock makes redundant
-      integer :: n_joints = 0                !! relaxing hinges
+      integer :: n_joints = 0                !! relaxing hinges that are not locked
       real(wp), allocatable :: q(:), p(:)    !! the state (n_q), (dof)
       real(wp), allocatable :: acceleration(:) !! p' there (dof)
       integer, allocatable :: kept(:)          !! where the coordinates stand in q, those of relaxing hinges last (n + n_joints)
@@ -50,6 +50,7 @@ contains
       real(wp), intent(in) :: y(:) !! (q, p, ...)
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: by_state(:, :)
+      integer, allocatable :: moving(:)
       integer :: i
       logical :: ok
 
@@ -57,7 +58,8 @@ contains
          call new_assembled_system(motion%system, scene, error) ! hinges may have changed since it was used last
          if (allocated(error)) return
          model%n_base = scene%n_base
-         model%n_joints = r - m
+         moving = pack([(i, i=1, r - m)], .not. scene%hinges%locked(scene%hinges%relaxing))
+         model%n_joints = size(moving)
          model%q = y(:r)
          model%p = y(r + 1:r + m)
          allocate (model%acceleration(m), model%joints(r - m, r), by_state(m, r + m))
@@ -78,8 +80,12 @@ contains
             model%n_free_hinges = count(law%stiffness <= 0.0_wp .and. .not. law%locked)
             model%n_idle_hinges = count(law%stiffness <= 0.0_wp .and. law%damping <= 0.0_wp .and. .not. law%locked)
          end associate
-         model%kept = [free_coordinates(scene), [(i, i=m + 1, r)]]
+         model%kept = [free_coordinates(scene), m + moving]
          model%n = size(model%kept) - model%n_joints
+         if (model%n_joints < r - m) then
+            model%stiffness = model%stiffness(:, model%kept)
+            model%joints = model%joints(moving, model%kept)
+         end if
          if (.not. has_slaves(scene)) return
          model%expansion = expansion_matrix(scene)
       end associate
@@ -109,6 +115,7 @@ contains
       class(linear_model), intent(in) :: self
       complex(wp), intent(in) :: x(:) !! (n + n_joints)
       complex(wp) :: full(size(self%q))
+      full = (0.0_wp, 0.0_wp)
       full(self%kept) = x
       if (allocated(self%expansion)) full = matmul(self%expansion, x)
    end function whole
