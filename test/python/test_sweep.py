@@ -362,6 +362,36 @@ def test_frequencies_have_the_same_bytes_in_every_way(here, how):
     assert content(here / "s") == wanted
 
 
+def test_frequencies_at_equilibria_are_those_of_rodyn_modes(here):
+    base = """&spacecraft motion = 'fixed' /
+&chain n_rods = 2, length = 1, mass_per_length = 1.5, hinge_stiffness = 40 /
+&model bending = 'rigid' /
+&load target = 'node', node = 2, component = 'X', value = -10 /
+&load target = 'node', node = 2, component = 'Y', value = 20 /
+&hinge hinge = 1, held = .true., release_time = 9 /
+"""
+    (here / "base.nml").write_text(base)
+    text = "&sweep base = 'base.nml', frequencies = 2, frequencies_at = 'equilibrium', integrate = .false. /\n{} /"
+    sweep(here, text.format("&axis key = 'load(1).value', values = -10, 30"))
+    data = opened(here)
+    assert "at the equilibrium" in data.frequency.long_name and np.isnan(data.frequency[:, 1]).all()
+    for case, value in enumerate((-10, 30)):
+        (here / "one.nml").write_text(base.replace("-10", str(value)))
+        subprocess.run([RODYN, "modes", "one.nml", "--equilibrium", "--force", "--quiet"], cwd=here, check=True)
+        with xarray.open_dataset(here / "one_modes.h5") as found:
+            np.testing.assert_allclose(data.frequency[case, 0], found.frequency[0], rtol=1e-12)
+            # One rod of length 2 and J = 1.5 8/3 on C = 40 with X, Y at its end: J w^2 = C + 2 (X cos phi + Y sin phi).
+            phi = float(found.state.sel(coordinate="phi_1"))
+            assert abs(40 * phi - 2 * (20 * math.cos(phi) - value * math.sin(phi))) < 1e-9
+            stiffness = 40 + 2 * (value * math.cos(phi) + 20 * math.sin(phi))
+            np.testing.assert_allclose(found.frequency[0], math.sqrt(stiffness / 4), rtol=1e-10)
+    failed = sweep(here, text.format("&axis key = 'load(1).law', text_values = 'constant', 'smooth_step'"), name="t", code=1)
+    assert list(opened(here, "t").status) == ["done", "failed"] and failed.returncode == 1
+    assert "a load varies in time" in str(opened(here, "t").message.values[1])
+    refused = sweep(here, text.format("&axis key = 'case.t_end', values = 1").replace("frequencies = 2, ", ""), name="u", code=2)
+    assert "goes with frequencies only" in refused.stderr
+
+
 def test_frequencies_alone_cost_no_integration(here):
     result = sweep(here, FREQUENCIES.format("integrate = .false.,"))
     assert "lanes   none" in result.stdout

@@ -38,6 +38,7 @@ module rodyn_sweep_config
       real(wp) :: case_seconds = 0.0_wp                     !! wall time limit; 0: none
       logical :: lanes = .true.                             !! like cases may go side by side
       integer :: frequencies = 0                            !! natural frequencies that are kept of each case
+      logical :: at_equilibrium = .false.                   !! they are those there, not at the initial state
       logical :: integrate = .true.                         !! otherwise nothing else is computed
       type(sweep_axis), allocatable :: axes(:)
       integer :: n_dimensions = 0

@@ -105,7 +105,7 @@ contains
       type(sweep_config), intent(inout) :: sweep
       logical, intent(in) :: base_is_sound
       type(field_loader) :: loader
-      character(len=name_length) :: combine
+      character(len=name_length) :: combine, at
       character(len=:), allocatable :: path
       integer :: i, n_axes
 
@@ -120,6 +120,9 @@ contains
       call loader%field('case_seconds', sweep%case_seconds)
       call loader%field('lanes', sweep%lanes)
       call loader%field('frequencies', sweep%frequencies)
+      at = 'start'
+      call loader%word_field('frequencies_at', at)
+      sweep%at_equilibrium = at == 'equilibrium'
       call loader%field('integrate', sweep%integrate)
       call loader%close_group()
       if (base_is_sound .and. entry_of(checked, 'sweep', 1, 'probe_times', any_state=.true.) == 0) &
@@ -130,6 +133,8 @@ contains
          exit
       end do
 
+      if (sweep%at_equilibrium .and. sweep%frequencies == 0) &
+         call blame(checked, 'sweep', 1, 'frequencies_at', 'goes with frequencies only')
       if (.not. sweep%integrate) then
          if (sweep%frequencies == 0) call blame(checked, 'sweep', 1, 'integrate', &
                                                 'leaves nothing to compute unless frequencies is positive')
