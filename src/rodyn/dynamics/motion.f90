@@ -166,10 +166,11 @@ contains
       end associate
    end function drive_power
 
-   !> True unless joints of their own stand behind the coordinates, or hinges change their laws.
+   !> True unless joints of their own stand behind the coordinates, or hinges change their laws at times that are not known
+   !> before. Prestressed hinges, and those that are held until a given time, do not.
    logical function has_lanes(self)
       class(motion_type), intent(in) :: self
-      has_lanes = self%n_q == self%n_dof .and. .not. self%events%watches
+      has_lanes = self%n_q == self%n_dof .and. self%n_events == 0
    end function has_lanes
 
    !> p' at several times and states at once.

@@ -145,7 +145,7 @@ contains
          measured = merge(here(which), huge(1.0_wp), ok)
       end function measured
 
-      !> Is function j negative near its minimum inside a bracket? Then `here`, `y_try` and `share` are of such a place.
+      !> Is this function negative near its minimum inside a bracket? Then `here`, `y_try` and `share` are of such a place.
       logical function dips(which, ends, at_ends, change)
          integer, intent(in) :: which
          real(wp), intent(in) :: ends(3), at_ends(3) !! bracket and its middle; functions there
@@ -173,13 +173,14 @@ contains
          ! The minimum is where the interpolant has risen by less than it may be off, here and there.
          reach = sqrt(4.0_wp*safety*off/curvature)
          a([1, 3]) = [max(ends(1), a(2) - reach), min(ends(3), a(2) + reach)]
+         if (.not. (a(1) < a(2) .and. a(2) < a(3))) return
          do k = 1, 3, 2
             f(k) = measured(which, a(k))
             dips = f(k) <= 0.0_wp
             if (dips .or. .not. ok) return
          end do
          do k = 1, most_narrowings
-            if (f(2) > min(f(1), f(3))) return ! it is lowest at an end of the step
+            if (f(2) > min(f(1), f(3))) return ! its minimum is not in the bracket
             trial = vertex(a, f)
             if (abs(trial - a(2)) <= small*(a(3) - a(1))) return
             if (0.5_wp*bend(a, f)*(trial - a(2))**2 < idle*f(2)) return
