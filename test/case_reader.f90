@@ -36,6 +36,7 @@ contains
          new_test('one element can be set again and again', set_element_again), &
          new_test('a key can be set in a group that the file has not', set_in_new_group), &
          new_test('a repeated group needs its number', set_in_load), &
+         new_test('an element of a list is replaced where it stands', set_in_list), &
          new_test('a key that cannot be set says why', set_refused), &
          new_test('a wrong value set is told without a line', set_wrong_value), &
          new_test('a file that cannot be read is named', no_such_file), &
@@ -302,6 +303,28 @@ contains
       if (allocated(error)) return
       call check_close(error, [config%loads%value], [1.0_wp, 3.0_wp], 0.0_wp, 'values')
    end subroutine set_in_load
+
+   subroutine set_in_list(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable :: refusal
+      type(namelist_document) :: document
+      type(case_config) :: config
+      character(len=*), parameter :: loads = '&load value = 1 / &load law = ''table'', times = 0, 1, 2, 3, values = 2*5, 2*6.5 /'
+
+      call parse_document(valid//loads, 'c.nml', document)
+      call set_value(document, 'load(2).values(2)', '7', error, in_list=.true.)
+      if (.not. allocated(error)) call set_value(document, 'load(2).values(4)', '-8e0', error, in_list=.true.)
+      if (.not. allocated(error)) call set_value(document, 'load(2).values(2)', '9', error, in_list=.true.)
+      if (.not. allocated(error)) call case_from_document(document, config, error)
+      if (allocated(error)) return
+      call check_close(error, config%loads(2)%values, [5.0_wp, 9.0_wp, 6.5_wp, -8.0_wp], 0.0_wp, 'values')
+      if (allocated(error)) return
+      call set_value(document, 'load(2).values(5)', '1', refusal, in_list=.true.)
+      call check(error, refusal%message, 'load(2).values(5): there is no such element; the list has 4, numbered from 1', 'refusal')
+      if (allocated(error)) return
+      call set_value(document, 'load(1).values(1)', '1', refusal, in_list=.true.)
+      call check(error, refusal%message, 'load(1).values(1): the base gives no list whose element this could be', 'refusal')
+   end subroutine set_in_list
 
    subroutine set_refused(error)
       type(error_type), allocatable, intent(out) :: error

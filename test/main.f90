@@ -15,6 +15,7 @@ program tester
    use test_lanes, only: collect_lanes
    use test_locks, only: collect_locks
    use test_method_choice, only: collect_method_choice
+   use test_held_modes, only: collect_held_modes
    use test_modes, only: collect_modes
    use test_motion, only: collect_motion
    use test_moving, only: collect_moving
@@ -53,6 +54,7 @@ program tester
    call run('lanes', collect_lanes)
    call run('motion', collect_motion)
    call run('modes', collect_modes)
+   call run('held_modes', collect_held_modes)
    call run('moving', collect_moving)
    call run('newton', collect_newton)
    call run('integrators', collect_integrators)

@@ -6,6 +6,7 @@ module test_moving
    use rodyn_loads, only: load_value
    use rodyn_kink_program, only: kink_set, kink_regime, new_kink_set, new_kink_regime, evaluate_kinks
    use rodyn_scene, only: scene_type, new_scene
+   use rodyn_text, only: to_text
    use rodyn_motion, only: motion_type, new_motion, initial_state
    use rodyn_user_load, only: user_load
    use test_motions, only: check_jacobian
@@ -41,6 +42,7 @@ contains
                new_test('a very stiff driven hinge follows its kink', test_stiff_drive), &
                new_test('a step of the kink works on the spring, and every method restarts there', test_kink_step), &
                new_test('a rod between two stops bounces as the closed form says', test_bounce), &
+               new_test('a stop that is only grazed is seen, however short the touch', test_graze), &
                new_test('a damped stop pushes but never pulls', test_damped_stop), &
                new_test('freeplay follows its closed form', test_freeplay), &
                new_test('dry friction stops a rod after F-limited decay', test_friction), &
@@ -49,10 +51,12 @@ contains
                new_test('Jacobian equals central differences beside stops and friction', test_jacobian), &
                new_test('events without end are refused', test_chatter), &
                new_test('collocation refuses events', test_gauss_refuses), &
+               new_test('collocation takes hinges that are prestressed, held and released at a time', test_gauss_takes), &
                new_test('two rigid rods that latch keep momentum and lose what the closed form says', test_latch_impulse), &
                new_test('a hold released at t0 goes on as a run that starts there', test_release), &
                new_test('a held chain is one rigid body', test_held_body), &
                new_test('a lock is the limit of a stiff spring', test_stiff_lock), &
+               new_test('locks beside exact dampers are limits of stiff springs, and of weak dampers', test_exact_locks), &
                new_test('hinges deploy one after the other, in every kind of scene, and energy balances', test_sequence), &
                new_test('loads written by a user do what the same loads of a case do, by every method', test_written_loads), &
                new_test('feedback of a user holds the attitude as its closed form says', test_feedback), &
@@ -356,6 +360,68 @@ contains
       end do
    end subroutine test_bounce
 
+   !> x = A sin w t meets a stop at s = (1 - e) A from below: with W^2 = (C + Cs)/J, x - s = u + R cos(W t - f) until it is left
+   !> after 2 f/W, u = -C s/(C + Cs), R cos f = -u, R sin f = v/W. The stop returns all, so that x goes on as if it had begun later:
+   !> a touch each period. Touches last 2 f/W, down to a thousandth of the time from one point of the search to the next. A stop
+   !> just beyond A is not touched.
+   subroutine test_graze(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+      type(hinge_config) :: hinge
+      type(trajectory) :: run
+      real(wp), parameter :: c = 25.0_wp, cs = 40.0_wp, amplitude = 0.5_wp, pi = acos(-1.0_wp), w = sqrt(c), fast = sqrt(c + cs)
+      real(wp), parameter :: error_of_x = 5.0e-9_wp ! of the integration with its tolerance of 1e-10
+      integer, parameter :: n_periods = 12, n_phases = 23
+      character(len=6), parameter :: methods(2) = [character(len=6) :: 'dop853', 'erk']
+      real(wp) :: depth, s, f, speed, touch, period, first
+      integer :: i, k, m
+
+      do m = 1, 2
+         do k = 1, 8
+            depth = 10.0_wp**(-k)
+            call one_rod(config, c, 0.0_wp)
+            config%initial%phi_rate = amplitude*w
+            s = amplitude*(1.0_wp - depth)
+            hinge%upper_stop = s
+            hinge%stop_stiffness = cs
+            call add_hinge(config, hinge)
+            speed = amplitude*w*sqrt(depth*(2.0_wp - depth))
+            f = atan2(speed/fast, c*s/(c + cs))
+            touch = 2.0_wp*f/fast
+            first = asin(1.0_wp - depth)/w
+            period = touch + pi/w + 2.0_wp*first
+            config%t_end = n_periods*period
+            config%solver%method = methods(m)
+            config%solver%rtol = 1.0e-10_wp
+            config%solver%atol = 1.0e-12_wp
+            call integrate(config, [0.0_wp, config%t_end], run, error)
+            if (allocated(error)) return
+            call check(error, run%n_events, 2*n_periods, trim(methods(m))//': events at depth 1e-'//to_text(k))
+            if (allocated(error)) return
+            do i = 1, n_periods
+               call check_close(error, run%events(2*i - 1)%time, first + (i - 1)*period, error_of_x/speed, &
+                                trim(methods(m))//': touches')
+               if (allocated(error)) return
+            end do
+            config%t_end = 2.0_wp ! the same from other phases: the touch is anywhere in a step
+            do i = 1, n_phases
+               config%initial%phi = -amplitude*sin(1.2_wp*i/n_phases)
+               config%initial%phi_rate = amplitude*w*cos(1.2_wp*i/n_phases)
+               config%hinges(1)%upper_stop = s
+               call integrate(config, [0.0_wp, first + 0.24_wp*i/n_phases + touch + 0.1_wp], run, error)
+               if (allocated(error)) return
+               call check(error, run%n_events, 2, trim(methods(m))//': events at depth 1e-'//to_text(k)//', phase '//to_text(i))
+               if (allocated(error)) return
+               config%hinges(1)%upper_stop = amplitude*(1.0_wp + depth)
+               call integrate(config, [0.0_wp, 2.0_wp], run, error)
+               if (allocated(error)) return
+               call check(error, run%n_events, 0, trim(methods(m))//': no touch')
+               if (allocated(error)) return
+            end do
+         end do
+      end do
+   end subroutine test_graze
+
    !> Meeting a stop with v: x'' = -Cs x - Ds x' until its moment Cs x + Ds x' vanishes, where x'' = 0. With
    !> 2 z = Ds, w^2 = Cs - z^2:  x = (v/w) e^{-z t} sin w t, and x'' = 0 at tan(w t) = 2 z w/(z^2 - w^2).
    subroutine test_damped_stop(error)
@@ -610,7 +676,7 @@ contains
       call integrate(config, [0.0_wp, 1.0_wp], run, refusal)
       call check(error, allocated(refusal), 'accepted')
       if (allocated(error)) return
-      call check(error, index(refusal%message, 'hinges that change their laws') > 0, refusal%message)
+      call check(error, index(refusal%message, 'stops, freeplay, friction and latches') > 0, refusal%message)
    end subroutine test_gauss_refuses
 
    !> Two equal rigid rods on a fixed hinge without springs, the first at rest, the second turning with v. When they are in
@@ -701,7 +767,6 @@ contains
       call random_case(config, which, 3)
       deallocate (config%loads)
       allocate (config%loads(0), config%hinges(0), config%kink_programs(0))
-      config%model%dampers = 'reduced'
       config%chain%bending_stiffness = 500.0_wp
       config%chain%hinge_stiffness = 100.0_wp
       config%chain%kink = 0.0_wp
@@ -723,6 +788,44 @@ contains
       config%t_end = 1.0_wp
    end subroutine held_case
 
+   !> A hinge is held for a while, another one pulls by its prestress, a kink moves: against dop853.
+   subroutine test_gauss_takes(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+      type(hinge_config) :: hinge
+      type(trajectory) :: by_gauss, by_dop853
+      real(wp) :: scale
+      integer :: which
+
+      call seed_random(28)
+      do which = 1, n_kinds
+         call held_case(config, which)
+         if (config%model%dampers == 'exact' .or. index(kind_name(which), 'paper distributed dynamic') > 0) cycle
+         hinge%hinge = 2
+         hinge%rest_angle = -0.5_wp
+         config%hinges = [config%hinges(1), hinge]
+         deallocate (config%kink_programs)
+         allocate (config%kink_programs(1))
+         config%kink_programs(1)%t_start = 0.2_wp
+         config%kink_programs(1)%t_end = 0.7_wp
+         config%kink_programs(1)%value = 0.3_wp
+         config%solver%method = 'gauss'
+         call integrate(config, [0.0_wp, 0.4_wp, 1.0_wp], by_gauss, error)
+         config%solver%method = 'dop853'
+         if (.not. allocated(error)) call integrate(config, [0.0_wp, 0.4_wp, 1.0_wp], by_dop853, error)
+         if (allocated(error)) return
+         call check(error, by_gauss%n_events, 1, kind_name(which)//': released')
+         if (allocated(error)) return
+         call check_close(error, [by_gauss%rows(2)%phi, by_gauss%rows(3)%phi], [by_dop853%rows(2)%phi, by_dop853%rows(3)%phi], &
+                          1.0e-7_wp, kind_name(which)//': angles')
+         if (allocated(error)) return
+         scale = maxval(by_gauss%rows%energy_kinetic + by_gauss%rows%energy_elastic)
+         call check_close(error, by_gauss%rows%energy_residual, spread(0.0_wp, 1, 3), 1.0e-8_wp*scale, &
+                          kind_name(which)//': residual')
+         if (allocated(error)) return
+      end do
+   end subroutine test_gauss_takes
+
    !> Nothing moves while all is in balance and the prestressed hinge is held. Released, it moves as if it had started then.
    subroutine test_release(error)
       type(error_type), allocatable, intent(out) :: error
@@ -740,6 +843,7 @@ contains
          if (allocated(error)) return
          call check_close(error, held%rows(2)%phi, [0.0_wp, 0.0_wp, 0.0_wp], 1.0e-12_wp, kind_name(which)//': held')
          if (allocated(error)) return
+         if (config%model%dampers == 'exact') cycle ! a run that starts with balanced dampers is another motion
          config%hinges(1)%held = .false.
          call integrate(config, [0.0_wp, 0.6_wp], free, error)
          if (allocated(error)) return
@@ -804,6 +908,56 @@ contains
       end do
       call check(error, miss(1) > 1.0e-6_wp .and. miss(2) < 0.02_wp*miss(1), 'the difference does not fall as 1/C')
    end subroutine test_stiff_lock
+
+   !> A held hinge, released under load, which then latches, each hinge with a damper whose rotation is a state. As a constraint
+   !> against springs C (differences fall with 1/C); and against reduced dampers, whose joints jump where these creep (with D).
+   subroutine test_exact_locks(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config, weak
+      type(trajectory) :: exact, other
+      real(wp) :: miss(2)
+      integer :: i
+
+      call seed_random(27)
+      call held_case(config, 7)
+      call check(error, trim(config%model%dampers), 'exact', 'kind')
+      if (allocated(error)) return
+      config%chain%hinge_damping = 2.0_wp
+      config%initial%omega = 0.0_wp
+      config%hinges(1)%release_time = 0.1_wp
+      config%hinges(1)%latch_angle = 0.1_wp
+      config%hinges(1)%rest_angle = 0.0_wp
+      deallocate (config%loads)
+      allocate (config%loads(1))
+      config%loads(1)%target = 'node'
+      config%loads(1)%component = 'Y'
+      config%loads(1)%node = 3
+      config%loads(1)%value = 40.0_wp
+      config%solver%method = 'bdf'
+      call integrate(config, [0.0_wp, 1.0_wp], exact, error)
+      if (allocated(error)) return
+      call check(error, exact%n_events, 2, 'released and latched')
+      if (allocated(error)) return
+      do i = 1, 2
+         weak = config
+         weak%hinges(1)%lock_stiffness = 10.0_wp**(4 + i)
+         call integrate(weak, [0.0_wp, 1.0_wp], other, error)
+         if (allocated(error)) return
+         miss(i) = maxval(abs(other%rows(2)%phi - exact%rows(2)%phi))
+      end do
+      call check(error, miss(1) > 1.0e-6_wp .and. abs(miss(1)/miss(2) - 10.0_wp) < 2.0_wp, 'the difference does not fall as 1/C')
+      if (allocated(error)) return
+      do i = 1, 2
+         config%chain%hinge_damping = 10.0_wp**(-i)
+         config%model%dampers = 'exact'
+         call integrate(config, [0.0_wp, 1.0_wp], exact, error)
+         config%model%dampers = 'reduced'
+         if (.not. allocated(error)) call integrate(config, [0.0_wp, 1.0_wp], other, error)
+         if (allocated(error)) return
+         miss(i) = maxval(abs(other%rows(2)%phi - exact%rows(2)%phi))
+      end do
+      call check(error, miss(1) > 1.0e-6_wp .and. abs(miss(1)/miss(2) - 10.0_wp) < 3.0_wp, 'the difference does not fall with D')
+   end subroutine test_exact_locks
 
    !> Three hinges: the first latches and releases the second, which latches and releases the third, which latches.
    subroutine test_sequence(error)

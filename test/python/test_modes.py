@@ -71,6 +71,66 @@ def test_the_damping_matrix_is_that_of_the_dampers(tmp_path):
     np.testing.assert_allclose(with_dampers.decay, expected, rtol=1e-6)
 
 
+ONE_ROD = """&spacecraft motion = 'fixed' /
+&chain n_rods = 1, length = 1.4, mass_per_length = 1.3, bending_stiffness = 700, node_mass = 0.2, hinge_stiffness = 300 /
+&rod_profile quantity = 'mass_per_length', polynomial = 1, -0.5, 0.8 /
+&rod_profile quantity = 'bending_stiffness', positions = 0, 0.3, 0.3, 1, values = 2, 1, 0.6, 0.2 /
+&model bending_shapes = 3, gauss_points = 5 /
+"""
+
+
+def test_a_bubble_on_a_profiled_rod_has_the_matrices_of_quadrature(tmp_path):
+    """int m fi fj and int EI fi'' fj'' over s, Na, Nb, Nc by numpy's polynomials, on each piece of the table."""
+    data = modes_of(tmp_path, ONE_ROD)
+    length, power = 1.4, np.polynomial.Polynomial
+    x = power([0, 1])  # s/l
+    shapes = [length * x, length * x * (1 - x) ** 2, -length * x**2 * (1 - x), 16 * x**2 * (1 - x) ** 2]
+    density = 1.3 * (1 - 0.5 * x + 0.8 * x**2)
+    pieces = [(0, 0.3, 700 * (2 - x / 0.3)), (0.3, 1, 700 * (0.6 - 0.4 * (x - 0.3) / 0.7))]
+
+    def integral(f, first, last):
+        return length * (f.integ()(last) - f.integ()(first))
+
+    mass = np.array([[integral(density * f * g, 0, 1) for g in shapes] for f in shapes])
+    mass[0, 0] += 0.2 * length**2
+    stiffness = np.array([[sum(integral(bend * f.deriv(2) * g.deriv(2), a, b) for a, b, bend in pieces) / length**4 for g in shapes]
+                          for f in shapes])
+    stiffness[:2, :2] += 300
+    order = ["phi", "alpha", "beta", "bubble"]
+    rates, places = [f"{name}_rate_1" for name in order], [f"{name}_1" for name in order]
+    np.testing.assert_allclose(data.mass_matrix.sel(equation=rates, rate=rates), mass, rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(data.stiffness_matrix.sel(equation=rates, coordinate=places), stiffness, rtol=1e-12, atol=1e-9)
+    expected = np.sqrt(np.sort(np.linalg.eigvals(np.linalg.solve(mass, stiffness)).real))
+    np.testing.assert_allclose(data.frequency, expected, rtol=1e-9)
+    found = np.concatenate([data[f"{name}_real"].values for name in order], axis=1)
+    np.testing.assert_allclose(found @ mass @ found.T, np.eye(4), atol=1e-9)
+    np.testing.assert_allclose(found @ stiffness @ found.T, np.diag(expected**2), atol=1e-9 * expected[-1] ** 2)
+    assert data.bubble_real.units == "m" and data.bubble_real.dims == ("mode", "rod")
+
+
+HELD = """&spacecraft mass = 30, inertia = 9, hinge_x = 0.4 /
+&chain n_rods = 3, length = 1, mass_per_length = 1.5, bending_stiffness = 900, hinge_stiffness = 40, node_mass = 0.1 /
+&model bending_shapes = 3, gauss_points = 6 /
+&initial phi = 0, 0.5, 0.5 /
+&hinge hinge = 1, held = .true., release_time = 0.1, rest_angle = 0.5 /
+"""
+
+
+def test_a_held_hinge_is_no_unknown(tmp_path):
+    data = modes_of(tmp_path, HELD)
+    names = list(data.coordinate.values)
+    assert "phi_2" not in names and "phi_rate_2" not in data.equation.values and len(names) == 3 + 3 * 4 - 1
+    assert list(data.kind.values).count("oscillation") == 11
+    opening = data.phi_real[:, 1] + data.alpha_real[:, 1] - data.phi_real[:, 0] - data.beta_real[:, 0]
+    np.testing.assert_allclose(opening, 0, atol=1e-12 * np.abs(data.alpha_real).max())
+    np.testing.assert_allclose(data.state.sel(coordinate=["phi_1", "phi_3"]), [0, 0.5])
+    free = modes_of(tmp_path, HELD.replace("held = .true., release_time = 0.1, ", ""))
+    assert "phi_2" in free.coordinate.values and free.sizes["mode"] == data.sizes["mode"] + 1
+    oscillations = [one.frequency.values[one.kind.values == "oscillation"] for one in (free, data)]
+    # Rayleigh: a constraint raises frequencies, each at most to the next one (both states are the same).
+    assert np.all(oscillations[1] >= oscillations[0][:-1] * (1 - 1e-12)) and np.all(oscillations[1] <= oscillations[0][1:] * (1 + 1e-12))
+
+
 def test_kinks_fold_the_equilibrium(tmp_path):
     data = modes_of(tmp_path, SPACECRAFT + KINKED, "--equilibrium")
     state = data.state.sel(coordinate=["phi_1", "phi_2", "phi_3"])
@@ -113,9 +173,11 @@ def test_two_hundred_rods_take_seconds(tmp_path):
     assert np.all(data.damping_ratio[3:] > 0)
 
 
-@pytest.mark.parametrize("options", [[], ["--modes", "4", "5", "--frame", "moving", "--amplitude", "0.3"]])
-def test_shapes_are_drawn(tmp_path, options):
-    modes_of(tmp_path, SCENES["flexible"])
+@pytest.mark.parametrize(("scene", "options"), [
+    (SCENES["flexible"], []), (SCENES["flexible"], ["--modes", "4", "5", "--frame", "moving", "--amplitude", "0.3"]), (HELD, []),
+    (ONE_ROD, [])])
+def test_shapes_are_drawn(tmp_path, scene, options):
+    modes_of(tmp_path, scene)
     script = result_files.ROOT / "postproc" / "mode_shapes.py"
     result = subprocess.run([sys.executable, str(script), str(tmp_path / "case_modes.h5"), "--out", str(tmp_path / "m.png"), *options],
                             capture_output=True, text=True)

@@ -20,7 +20,9 @@ import xarray
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 RODYN = os.environ.get("RODYN", str(ROOT / "bin" / "rodyn"))
 sys.path.insert(0, str(ROOT / "bench" / "sweeps"))
+sys.path.insert(0, str(ROOT / "postproc"))
 from campaign import content, results  # noqa: E402
+from rodyn_data import open_sweep  # noqa: E402
 
 BASE = """
 &case t_end = 0.05, n_outputs = 5 /
@@ -101,6 +103,74 @@ def test_zip_takes_first_with_first(here):
     np.testing.assert_allclose(data["param_chain.hinge_stiffness(0)"], [1000, 2000, 4000], rtol=1e-15)
     assert list(data["param_load(2).value"]) == [1, 2, 3]
     assert data["param_chain.hinge_stiffness(0)"].units == "N m/rad"
+
+
+MOVING = """
+&case t_end = 0.5, n_outputs = 5 /
+&spacecraft mass = 20, inertia = 8, hinge_x = 0.4 /
+&chain n_rods = 3, length = 1, mass_per_length = 1.5, bending_stiffness = 900, hinge_stiffness = 40 /
+&rod_profile quantity = 'mass_per_length', polynomial = 1, 0.5 /
+&rod_profile quantity = 'bending_stiffness', polynomial = 2*1.0, -0.5 /
+&model bending = 'quasistatic', inertia = 'lumped' /
+&kink_program hinge = 0, t_end = 0.4, value = 0.2 /
+&kink_program hinge = 1, law = 'table', times = 0, 0.2, 0.4, values = 0, 0.1, 0.05 /
+&hinge hinge = 2, rest_angle = 0.3 /
+&hinge hinge = 1, held = .true., release_time = 0.1, rest_angle = 0.2 /
+&solver method = 'dop853', rtol = 1e-9, atol = 1e-11 /
+"""
+
+
+@pytest.mark.parametrize(("key", "values", "old", "new"), [
+    ("hinge(2).release_time", "0.1, 0.3", "release_time = 0.1", "release_time = 0.3"),
+    ("hinge(1).hinge", "2, 0", "hinge = 2,", "hinge = 0,"),
+    ("kink_program(1).value", "0.2, 0.4", "value = 0.2 /", "value = 0.4 /"),
+    ("kink_program(2).values(2)", "0.1, 0.3", "0, 0.1, 0.05", "0, 0.3, 0.05"),
+    ("rod_profile(2).polynomial(2)", "1.0, 0.25", "2*1.0, -0.5", "1.0, 0.25, -0.5"),
+    ("rod_profile(1).first_rod", "1, 2", "polynomial = 1, 0.5", "first_rod = 2, polynomial = 1, 0.5"),
+])
+def test_keys_of_repeated_groups_are_axes(here, key, values, old, new):
+    """The second value is that of a single run of the changed base; the first one is not."""
+    assert MOVING.count(old) == 1
+    (here / "base.nml").write_text(MOVING)
+    (here / "one.nml").write_text(MOVING.replace(old, new))
+    sweep(here, f"&sweep base = 'base.nml' /\n&axis key = '{key}', values = {values} /")
+    subprocess.run([RODYN, "run", "one.nml", "--quiet"], cwd=here, check=True)
+    data = opened(here)
+    assert list(data[f"param_{key}"]) == [float(value) for value in values.split(",")]
+    with xarray.open_dataset(here / "one.h5") as run:
+        np.testing.assert_allclose(data.final_phi[1], run.phi[-1], rtol=0, atol=1e-12)
+        assert np.abs(data.final_phi[0] - run.phi[-1]).max() > 1e-4
+    with open_sweep(here / "s" / "sweep.h5") as read:
+        assert list(read.axes) == [key] and key.split("(")[0] in read.axis_label(key)
+
+
+def test_a_hinge_is_held_or_not(here):
+    (here / "base.nml").write_text(MOVING.replace(", release_time = 0.1", ""))
+    sweep(here, "&sweep base = 'base.nml' /\n&axis key = 'hinge(2).held', text_values = '.true.', '.false.' /")
+    assert list(opened(here)["param_hinge(2).held"]) == [".true.", ".false."]
+    assert set(opened(here).status.values) == {"done"}
+
+
+@pytest.mark.parametrize(("key", "message"), [
+    ("hinge(3).rest_angle", "the base has 2 groups &hinge; the number in parentheses counts them in the order of the file"),
+    ("hinge.rest_angle", "the base has 2 groups &hinge; say which, as in hinge(1).rest_angle"),
+    ("hinge(0).rest_angle", "a key is written group.name"),
+    ("hinge(2).rest_angle(1)", "takes no index"),
+    ("load(1).value", "the base has no group &load"),
+    ("chain(1).length", "&chain stands once and takes no number: chain.length"),
+    ("chain.length(4)", "there is no such rod; they are numbered 1..3"),
+    ("kink_program(2).values(4)", "there is no such element; the list has 3, numbered from 1"),
+    ("rod_profile(1).values(1)", "the base gives no list whose element this could be"),
+])
+def test_groups_and_elements_that_are_not_there(here, key, message):
+    (here / "base.nml").write_text(MOVING)
+    assert message in sweep(here, f"&sweep base = 'base.nml' /\n&axis key = '{key}', values = 1 /", code=2).stderr
+
+
+def test_one_key_by_two_names_is_one_key(here):
+    (here / "base.nml").write_text(BASE.replace("&load component = 'X', t_end = 1, value = 10 /", ""))
+    text = "&sweep base = 'base.nml' /\n&axis key = 'load.value', values = 1 /\n&axis key = 'load(1).value', values = 2 /"
+    assert "the key has an axis already" in sweep(here, text, code=2).stderr
 
 
 def test_an_axis_along_another_stays_with_it_in_a_grid(here):
@@ -290,6 +360,36 @@ def test_frequencies_have_the_same_bytes_in_every_way(here, how):
     shard.write_bytes(damaged)  # one result is done again
     assert "checksum wrong; set aside, 3 good results" in sweep(here, None).stderr
     assert content(here / "s") == wanted
+
+
+def test_frequencies_at_equilibria_are_those_of_rodyn_modes(here):
+    base = """&spacecraft motion = 'fixed' /
+&chain n_rods = 2, length = 1, mass_per_length = 1.5, hinge_stiffness = 40 /
+&model bending = 'rigid' /
+&load target = 'node', node = 2, component = 'X', value = -10 /
+&load target = 'node', node = 2, component = 'Y', value = 20 /
+&hinge hinge = 1, held = .true., release_time = 9 /
+"""
+    (here / "base.nml").write_text(base)
+    text = "&sweep base = 'base.nml', frequencies = 2, frequencies_at = 'equilibrium', integrate = .false. /\n{} /"
+    sweep(here, text.format("&axis key = 'load(1).value', values = -10, 30"))
+    data = opened(here)
+    assert "at the equilibrium" in data.frequency.long_name and np.isnan(data.frequency[:, 1]).all()
+    for case, value in enumerate((-10, 30)):
+        (here / "one.nml").write_text(base.replace("-10", str(value)))
+        subprocess.run([RODYN, "modes", "one.nml", "--equilibrium", "--force", "--quiet"], cwd=here, check=True)
+        with xarray.open_dataset(here / "one_modes.h5") as found:
+            np.testing.assert_allclose(data.frequency[case, 0], found.frequency[0], rtol=1e-12)
+            # One rod of length 2 and J = 1.5 8/3 on C = 40 with X, Y at its end: J w^2 = C + 2 (X cos phi + Y sin phi).
+            phi = float(found.state.sel(coordinate="phi_1"))
+            assert abs(40 * phi - 2 * (20 * math.cos(phi) - value * math.sin(phi))) < 1e-9
+            stiffness = 40 + 2 * (value * math.cos(phi) + 20 * math.sin(phi))
+            np.testing.assert_allclose(found.frequency[0], math.sqrt(stiffness / 4), rtol=1e-10)
+    failed = sweep(here, text.format("&axis key = 'load(1).law', text_values = 'constant', 'smooth_step'"), name="t", code=1)
+    assert list(opened(here, "t").status) == ["done", "failed"] and failed.returncode == 1
+    assert "a load varies in time" in str(opened(here, "t").message.values[1])
+    refused = sweep(here, text.format("&axis key = 'case.t_end', values = 1").replace("frequencies = 2, ", ""), name="u", code=2)
+    assert "goes with frequencies only" in refused.stderr
 
 
 def test_frequencies_alone_cost_no_integration(here):

@@ -10,7 +10,7 @@ module rodyn_hinge_events
    use rodyn_integrator, only: time_text
    use rodyn_hinge_mechanism, only: hinge_mechanism, kind_names, kind_released, kind_latched, n_parts, &
       part_spring, part_lower, part_upper, part_friction, part_latch
-   use rodyn_hinge_law, only: hinge_law, hinge_state, openings
+   use rodyn_hinge_law, only: hinge_law, hinge_state, initial_joints, openings
    use rodyn_case_config, only: none_given
    use rodyn_accelerations, only: dynamics_type
    implicit none (type, external)
@@ -43,6 +43,7 @@ module rodyn_hinge_events
    contains
       procedure :: margins
       procedure :: begin
+      procedure :: adopt
       procedure :: respond
       procedure :: release_due
       procedure :: settle
@@ -126,26 +127,33 @@ contains
       end associate
    end function margin_of
 
-   !> Locks and laws at the start.
+   !> Locks and laws at the start. Massless rods are held unbent; the rotations of relaxing hinges, which are part of q, follow.
    subroutine begin(self, dynamics, q, p, error)
       class(event_set), intent(inout) :: self
       type(dynamics_type), intent(inout) :: dynamics
-      real(wp), intent(in) :: q(:), p(:)
+      real(wp), intent(inout) :: q(:)
+      real(wp), intent(in) :: p(:)
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: straight(0:dynamics%scene%n - 1)
+      real(wp), dimension(0:dynamics%scene%n - 1) :: at, turning
       integer :: i
 
       call find_joints(self, dynamics, 0.0_wp, q, p)
-      call openings(dynamics%scene%n, .false., q(dynamics%scene%n_base + 1:), straight) ! massless rods are held unbent
-      straight = straight - dynamics%scene%hinges%kink
+      at = self%theta
+      turning = self%theta_rate
+      if (dynamics%scene%quasistatic) then
+         call openings(dynamics%scene%n, .false., q(dynamics%scene%n_base + 1:), at)
+         call openings(dynamics%scene%n, .false., p(dynamics%scene%n_base + 1:), turning)
+         at = at - dynamics%scene%hinges%kink
+         turning = turning - dynamics%scene%hinges%kink_rate
+      end if
       do i = 1, size(dynamics%scene%hinges%mechanisms)
          associate (mechanism => dynamics%scene%hinges%mechanisms(i))
             associate (theta => self%theta(mechanism%hinge), rate => self%theta_rate(mechanism%hinge))
                call mechanism%settle(theta, rate)
                if (mechanism%held .and. mechanism%release_time > 0.0_wp) then
                   call mechanism%lock(theta)
-                  if (mechanism%is_constrained() .and. dynamics%scene%quasistatic) call mechanism%lock(straight(mechanism%hinge))
-                  if (mechanism%is_constrained() .and. abs(rate) > 1.0e-9_wp) &
+                  if (mechanism%is_constrained()) call mechanism%lock(at(mechanism%hinge))
+                  if (mechanism%is_constrained() .and. abs(turning(mechanism%hinge)) > 1.0e-9_wp) &
                      call raise(error, 'hinge '//to_text(mechanism%hinge)//' is held, but turns at the start')
                end if
                if (mechanism%latch < none_given) mechanism%latch_side = merge(1, -1, mechanism%latch > theta)
@@ -154,7 +162,40 @@ contains
          if (allocated(error)) return
       end do
       call dynamics%change_hinges()
+      associate (scene => dynamics%scene)
+         if (size(scene%hinges%relaxing) > 0) &
+            call initial_joints(scene%hinges, q(scene%phi_at() + 1:scene%phi_at() + scene%n), at, q(scene%n_dof + 1:))
+      end associate
    end subroutine begin
+
+   !> Choose the laws anew at a state to which no motion led; what is locked stays so. An equilibrium beyond a latch is none.
+   subroutine adopt(self, dynamics, t, q, p, changed, error)
+      class(event_set), intent(inout) :: self
+      type(dynamics_type), intent(inout) :: dynamics
+      real(wp), intent(in) :: t, q(:), p(:)
+      logical, intent(out) :: changed !! some hinge has another law
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), dimension(0:dynamics%scene%n - 1) :: stiffness, constant ! of T = C th + constant at rest
+      integer :: i
+
+      call find_joints(self, dynamics, t, q, p)
+      stiffness = dynamics%scene%hinges%stiffness
+      constant = dynamics%scene%hinges%constant + dynamics%scene%hinges%friction
+      do i = 1, size(dynamics%scene%hinges%mechanisms)
+         associate (mechanism => dynamics%scene%hinges%mechanisms(i))
+            if (mechanism%is_constrained()) cycle
+            associate (theta => self%theta(mechanism%hinge), rate => self%theta_rate(mechanism%hinge))
+               call mechanism%settle(theta, rate)
+               if (mechanism%margin(part_latch, t, theta, rate) < 0.0_wp) call raise(error, &
+                  'no equilibrium: hinge '//to_text(mechanism%hinge)//' latches before the chain comes to rest')
+            end associate
+         end associate
+         if (allocated(error)) return
+      end do
+      call dynamics%change_hinges(error)
+      changed = any(abs(stiffness - dynamics%scene%hinges%stiffness) > 0.0_wp) .or. &
+                any(abs(constant - (dynamics%scene%hinges%constant + dynamics%scene%hinges%friction)) > 0.0_wp)
+   end subroutine adopt
 
    !> Change the laws whose margins became negative. The rates p change if a hinge becomes a constraint.
    subroutine respond(self, dynamics, t, q, p, crossed, lost, error)

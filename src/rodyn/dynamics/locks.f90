@@ -10,7 +10,7 @@ module rodyn_locks
    use rodyn_scene, only: scene_type
    implicit none (type, external)
    private
-   public :: has_slaves, reduce, expand, reduce_matrix, free_coordinates, reactions
+   public :: has_slaves, reduce, expand, reduce_matrix, free_coordinates, expansion_matrix, reactions
 
 contains
 
@@ -91,6 +91,23 @@ contains
       free(scene%phi_at() + 1:scene%phi_at() + scene%n) = .not. (scene%hinges%locked .and. has_slaves(scene))
       list = pack([(i, i=1, scene%n_dof)], free)
    end function free_coordinates
+
+   !> T, dq = T dz, z the coordinates that are not slaved.
+   pure function expansion_matrix(scene) result(t)
+      type(scene_type), intent(in) :: scene
+      real(wp), allocatable :: t(:, :) !! (n_dof, size of z)
+      integer, allocatable :: free(:)
+      real(wp) :: still(0:scene%n - 1)
+      integer :: j
+
+      free = free_coordinates(scene)
+      still = 0.0_wp
+      allocate (t(scene%n_dof, size(free)), source=0.0_wp)
+      do j = 1, size(free)
+         t(free(j), j) = 1.0_wp
+         if (has_slaves(scene)) call expand(scene, scene%hinges%locked, still, t(:, j))
+      end do
+   end function expansion_matrix
 
    !> Moments of locked hinges from what the motion lacks without them, M p' - forces = sum -T_k d(opening_k)/dq: turning
    !> all rods beyond hinge k opens that hinge alone.

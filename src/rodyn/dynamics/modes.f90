@@ -102,18 +102,29 @@ contains
       type(reduced_model) :: reduced
       logical :: at_rest
 
+      if (model%n == 0) then
+         call raise(error, 'no modes: the spacecraft is fixed and every hinge is locked')
+         return
+      end if
       call reduce(reduced, model, error)
       if (allocated(error)) return
+      if (reduced%nc == 0) then ! all of it is one rigid body, and loads along its axes do not feel how it moves
+         modes%conservative = .true.
+         call conservative_modes(modes, model, reduced, with_shapes)
+         if (with_shapes) call complete_shapes(modes, model)
+         return
+      end if
       modes%fastest = sqrt(max(0.0_wp, maxval(abs(reduced%omega_2))))
       at_rest = model%is_steady(modes%fastest) .and. .not. model%loaded
       if (model%n_base > 0) at_rest = at_rest .and. abs(model%p(3)) <= 0.0_wp
-      modes%conservative = at_rest .and. size(model%joints, 1) == 0 .and. all(abs(reduced%c) <= 0.0_wp) .and. &
+      modes%conservative = at_rest .and. model%n_joints == 0 .and. all(abs(reduced%c) <= 0.0_wp) .and. &
                            reduced%asymmetry <= 1.0e3_wp*epsilon(1.0_wp)
       if (modes%conservative) then
          call conservative_modes(modes, model, reduced, with_shapes)
       else
          call general_modes(modes, model, reduced, at_rest, with_shapes, error)
       end if
+      if (with_shapes .and. .not. allocated(error)) call complete_shapes(modes, model)
    end subroutine new_modes
 
    !> Eliminate translation: with the total mass m, M_VV = m 1. Then find the undamped modes of the chain.
@@ -122,10 +133,9 @@ contains
       type(linear_model), intent(in) :: model
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: m(:, :), mc(:, :), kc(:, :), by_translation(:, :)
-      integer :: s, n, r, i, j
+      integer :: s, n, i, j
 
-      n = size(model%p)
-      r = size(model%q)
+      n = model%n
       reduced%nw = merge(1, 0, model%n_base > 0)
       reduced%nc = n - model%n_base
       s = model%n_base + 1 - reduced%nw ! first of w and the chain
@@ -150,7 +160,7 @@ contains
             end do
          end do
       end if
-      reduced%asymmetry = maxval(abs(kc - transpose(kc)))
+      reduced%asymmetry = max(0.0_wp, maxval(abs(kc - transpose(kc)))) ! rigid chains with all hinges locked have no elements
       if (reduced%nw == 1) reduced%asymmetry = max(reduced%asymmetry, maxval(abs(reduced%k(1, :))))
       reduced%asymmetry = reduced%asymmetry/max(maxval(abs(kc)), tiny(1.0_wp))
       kc = 0.5_wp*(kc + transpose(kc))
@@ -241,7 +251,7 @@ contains
       modes%kind(first + 1:) = kind
       if (size(eigenvalue) > 0) modes%fastest = maxval(abs(eigenvalue))
       if (.not. with_shapes) return
-      allocate (modes%shape(size(model%q), modes%n), source=(0.0_wp, 0.0_wp))
+      allocate (modes%shape(model%n + model%n_joints, modes%n), source=(0.0_wp, 0.0_wp))
       do i = 1, n_rigid
          modes%shape(i, i) = 1.0_wp
       end do
@@ -255,8 +265,8 @@ contains
       type(linear_model), intent(in) :: model
       type(reduced_model), intent(in) :: reduced
       real(wp), intent(in) :: x(:) !! of the chain (nc)
-      complex(wp) :: shape(size(model%q))
-      real(wp) :: full(size(model%p))
+      complex(wp) :: shape(model%n + model%n_joints)
+      real(wp) :: full(model%n)
 
       full(model%n_base + 1:) = x
       if (reduced%nw == 1) then
@@ -265,7 +275,6 @@ contains
       end if
       shape = (0.0_wp, 0.0_wp)
       shape(:size(full)) = full
-      if (maxval(abs(x)) > 0.0_wp) shape = shape*sign(1.0_wp, x(maxloc(abs(x), 1)))
    end function rest_shape
 
    !> Eigenvalues of the first-order equations.
@@ -339,9 +348,9 @@ contains
 
       nc = reduced%nc
       nw = reduced%nw
-      nj = size(model%joints, 1)
+      nj = model%n_joints
       b = model%n_base
-      n = size(model%p)
+      n = model%n
       v = nc + nj ! before the rates
       scale = sqrt(abs(reduced%omega_2))
       scale = max(scale, 1.0e-6_wp*maxval(scale), tiny(1.0_wp))
@@ -425,14 +434,14 @@ contains
       real(wp), intent(in) :: scale(:)
       complex(wp), intent(in) :: lambda
       complex(wp), intent(in) :: z(:) !! as the first-order equations have it
-      complex(wp) :: shape(size(model%q))
-      complex(wp) :: p(size(model%p)), force(2)
+      complex(wp) :: shape(model%n + model%n_joints)
+      complex(wp) :: p(model%n), force(2)
       real(wp) :: energy
       integer :: b, n, nj, v
 
       b = model%n_base
-      n = size(model%p)
-      nj = size(model%joints, 1)
+      n = model%n
+      nj = model%n_joints
       v = reduced%nc + nj + reduced%nw
       shape = (0.0_wp, 0.0_wp)
       shape(b + 1:n) = matmul(reduced%basis, z(:reduced%nc)/scale)
@@ -448,10 +457,25 @@ contains
       end if
       energy = real(dot_product(p, matmul(model%mass, p)), wp)
       if (energy > 0.0_wp .and. abs(lambda) > 0.0_wp) shape = shape*(abs(lambda)/sqrt(energy))
-      associate (largest => shape(b + maxloc(abs(shape(b + 1:n)), 1)))
-         if (abs(largest) > 0.0_wp) shape = shape*(conjg(largest)/abs(largest))
-      end associate
    end function moving_shape
+
+   !> From the coordinates that are kept to all of them, turned so that the largest of the chain is real and positive.
+   subroutine complete_shapes(modes, model)
+      type(mode_set), intent(inout) :: modes
+      type(linear_model), intent(in) :: model
+      complex(wp), allocatable :: shape(:, :)
+      complex(wp) :: largest
+      integer :: i, last
+
+      last = size(model%p)
+      allocate (shape(size(model%q), modes%n))
+      do i = 1, modes%n
+         shape(:, i) = model%whole(modes%shape(:, i))
+         largest = shape(model%n_base + maxloc(abs(shape(model%n_base + 1:last, i)), 1), i)
+         if (abs(largest) > 0.0_wp) shape(:, i) = shape(:, i)*(conjg(largest)/abs(largest))
+      end do
+      call move_alloc(shape, modes%shape)
+   end subroutine complete_shapes
 
    !> x of  lambda x + w (-x_2, x_1) = f: a vector along turning axes. Translation at lambda = +-i w is at rest along inertial
    !> axes and belongs to no mode of the chain.

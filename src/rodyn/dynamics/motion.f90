@@ -87,7 +87,7 @@ contains
             y(n_q + 1:n_q + 3) = [initial%velocity_x, initial%velocity_y, initial%omega]
          end if
          call place(scene%phi_at(), initial%phi, initial%phi_rate)
-         if (n_q > n_dof) call initial_joints(scene%hinges, initial%phi, y(n_dof + 1:n_q))
+         if (n_q > n_dof) call initial_joints(scene%hinges, initial%phi, spread(0.0_wp, 1, scene%n), y(n_dof + 1:n_q))
          if (.not. scene%dynamic_bending) return
          call place(scene%alpha_at(), initial%alpha, initial%alpha_rate)
          call place(scene%beta_at(), initial%beta, initial%beta_rate)
@@ -166,10 +166,11 @@ contains
       end associate
    end function drive_power
 
-   !> True unless joints of their own stand behind the coordinates, or hinges change their laws.
+   !> True unless joints of their own stand behind the coordinates, or hinges change their laws at times that are not known
+   !> before. Prestressed hinges, and those that are held until a given time, do not.
    logical function has_lanes(self)
       class(motion_type), intent(in) :: self
-      has_lanes = self%n_q == self%n_dof .and. .not. self%events%watches
+      has_lanes = self%n_q == self%n_dof .and. self%n_events == 0
    end function has_lanes
 
    !> p' at several times and states at once.

@@ -172,15 +172,11 @@ contains
       type(case_config), intent(in) :: config
 
       if (config%model%bending /= 'quasistatic' .or. config%model%dampers /= 'exact') return
-      if (hinge%held .or. hinge%latch_angle < none_given) then
-         call blame(checked, 'hinge', i, 'hinge', "held hinges and latches do not go with dampers = 'exact'")
-         return
-      end if
-      if (.not. max(hinge%stop_damping, hinge%friction_moment) > 0.0_wp) return
+      if (.not. max(hinge%stop_damping, hinge%lock_damping, hinge%friction_moment) > 0.0_wp) return
       if (.not. is_sound(checked, 'chain', 1, 'hinge_damping')) return
       if (hinge%hinge >= min(config%chain%n_rods, size(config%chain%hinge_damping))) return
       if (.not. config%chain%hinge_damping(hinge%hinge) > 0.0_wp) call blame(checked, 'hinge', i, 'hinge', &
-         "with dampers = 'exact', stop_damping and friction_moment need a hinge with hinge_damping")
+         "with dampers = 'exact', stop_damping, lock_damping and friction_moment need a hinge with hinge_damping")
    end subroutine check_dampers
 
 end module rodyn_hinge_rules

@@ -1,9 +1,7 @@
 !> Set a key of a parsed document, as a sweep does for each of its cases.
 module rodyn_namelist_edit
    use rodyn_errors, only: error_type, raise, exit_bad_input
-   use rodyn_faults, only: fault_list
-   use rodyn_namelist_document, only: namelist_document, namelist_entry, namelist_group, add_group, add_entry, &
-      find_group, group_count
+   use rodyn_namelist_document, only: namelist_document, namelist_entry, namelist_value, add_group, find_group, group_count
    use rodyn_namelist_parser, only: parse_key, parse_values, scanner
    use rodyn_text, only: is_name, lower, to_text
    implicit none (type, external)
@@ -16,17 +14,22 @@ contains
    !>
    !> `key` is 'group.name' or 'group.name(3)', and 'load(2).value' where a group stands several times. `text` is
    !> one or several values in namelist syntax; texts are in quotes. Whether the schema knows the key is found
-   !> when the case is built. A key set without index replaces all assignments to it; with an index, that element.
-   subroutine set_value(document, key, text, error)
+   !> when the case is built. A key set without index replaces all assignments to it; with an index, that element. Elements
+   !> of a list, whose length is that of its assignment (`in_list`), are replaced where they stand.
+   subroutine set_value(document, key, text, error, in_list)
       type(namelist_document), intent(inout) :: document
       character(len=*), intent(in) :: key
       character(len=*), intent(in) :: text
       type(error_type), allocatable, intent(out) :: error
+      logical, intent(in), optional :: in_list !! the key is a list; absent: no
       character(len=:), allocatable :: group, name
       type(namelist_document) :: fresh
       type(scanner) :: s
       integer :: g, instance
+      logical :: listed
 
+      listed = .false.
+      if (present(in_list)) listed = in_list
       call split_key(key, group, instance, name, error)
       if (allocated(error)) return
       call parse_one(name, text, fresh, s, error)
@@ -38,14 +41,19 @@ contains
       end if
       g = find_group(document, group, max(1, instance))
       if (g == 0 .and. instance > 1) then
-         call raise(error, key//': there is no such group', exit_bad_input)
+         call raise(error, key//': there is no such group; it stands '//to_text(group_count(document, group))//' times', &
+                    exit_bad_input)
          return
       end if
       if (g == 0) then
          call add_group(document, group, 0)
          g = document%n_groups
       end if
-      call replace(document, g, fresh)
+      if (listed .and. fresh%entries(1)%indexed) then
+         call replace_in_list(document, g, fresh, key, error)
+      else
+         call replace(document, g, fresh)
+      end if
    end subroutine set_value
 
    !> 'load(2).value' -> 'load', 2, 'value'; instance 0: none was given.
@@ -113,25 +121,79 @@ contains
       integer, intent(in) :: g
       type(namelist_document), intent(in) :: fresh
       type(namelist_entry) :: entry
-      integer :: shift, e
+      integer :: e
 
       entry = fresh%entries(1)
       entry%forced = .true.
-      entry%first = document%n_values + 1
-      entry%last = document%n_values + fresh%n_values
-      shift = len(document%text)
-      document%text = document%text//fresh%text
-      if (.not. allocated(document%values)) allocate (document%values(0))
-      document%values = [document%values(:document%n_values), fresh%values(:fresh%n_values)]
-      document%n_values = entry%last
-      document%values(entry%first:)%first = document%values(entry%first:)%first + shift
-      document%values(entry%first:)%last = document%values(entry%first:)%last + shift
-      document%values(entry%first:)%line = 0
+      call append_values(document, entry, placed_values(document, fresh))
       do e = document%groups(g)%last, document%groups(g)%first, -1
          if (is_void(document%entries(e), entry)) call remove(document, g, e)
       end do
       call insert(document, g, entry)
    end subroutine replace
+
+   !> Put the only value of `fresh` into elements of a list that stands in group `g`.
+   subroutine replace_in_list(document, g, fresh, key, error)
+      type(namelist_document), intent(inout) :: document
+      integer, intent(in) :: g
+      type(namelist_document), intent(in) :: fresh
+      character(len=*), intent(in) :: key !! for messages
+      type(error_type), allocatable, intent(out) :: error
+      type(namelist_value), allocatable :: list(:), new(:)
+      type(namelist_entry) :: entry
+      integer :: e, v
+
+      associate (wanted => fresh%entries(1))
+         do e = document%groups(g)%first, document%groups(g)%last
+            if (document%entries(e)%key == wanted%key .and. .not. document%entries(e)%indexed) exit
+         end do
+         if (e > document%groups(g)%last) then
+            call raise(error, key//': the base gives no list whose element this could be', exit_bad_input)
+            return
+         end if
+         allocate (list(0))
+         do v = document%entries(e)%first, document%entries(e)%last
+            list = [list, spread(document%values(v), 1, document%values(v)%copies)]
+         end do
+         list%copies = 1
+         if (wanted%lower < 1 .or. wanted%upper > size(list)) then
+            call raise(error, key//': there is no such element; the list has '//to_text(size(list))//', numbered from 1', &
+                       exit_bad_input)
+            return
+         end if
+         new = placed_values(document, fresh)
+         list(wanted%lower:wanted%upper) = new(1)
+      end associate
+      entry = document%entries(e)
+      call append_values(document, entry, list)
+      document%entries(e) = entry
+   end subroutine replace_in_list
+
+   !> The values of `fresh`, with its text put behind that of the document.
+   function placed_values(document, fresh) result(values)
+      type(namelist_document), intent(inout) :: document
+      type(namelist_document), intent(in) :: fresh
+      type(namelist_value), allocatable :: values(:)
+
+      values = fresh%values(:fresh%n_values)
+      values%first = values%first + len(document%text)
+      values%last = values%last + len(document%text)
+      values%line = 0
+      document%text = document%text//fresh%text
+   end function placed_values
+
+   !> Let an entry have these values.
+   subroutine append_values(document, entry, values)
+      type(namelist_document), intent(inout) :: document
+      type(namelist_entry), intent(inout) :: entry
+      type(namelist_value), intent(in) :: values(:)
+
+      entry%first = document%n_values + 1
+      entry%last = document%n_values + size(values)
+      if (.not. allocated(document%values)) allocate (document%values(0))
+      document%values = [document%values(:document%n_values), values]
+      document%n_values = entry%last
+   end subroutine append_values
 
    !> Does the new entry leave nothing of the old one?
    pure logical function is_void(old, new)

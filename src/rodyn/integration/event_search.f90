@@ -2,8 +2,10 @@
 !>
 !> A step is looked at in a few inner points of its cubic interpolant; what seems to be an event there, or is one at the
 !> end, is then found by regula falsi (Illinois) and bisection on states as accurate as the steps themselves, to the
-!> resolution of time. A function that becomes negative and positive again between two of these points is not seen; a shorter
-!> max_step sees more.
+!> resolution of time. A function that is low between its neighbours may be negative nearby and positive again at the next
+!> point: its minimum is sought, on the interpolant first, and, where that cannot exclude a crossing, on accurate states.
+!> Functions must have at most one minimum from one point to the next but one, as those of motions that the steps resolve have.
+!> What is left unseen is less than a hundred-millionth of what the curvature of a function makes in a step.
 module rodyn_event_search
    use rodyn_kinds, only: wp
    use rodyn_integrator, only: integrator_type
@@ -11,8 +13,14 @@ module rodyn_event_search
    private
    public :: find_event
 
-   integer, parameter :: n_looks = 4         !! points at which a step is looked at, its end included
+   integer, parameter :: n_looks = 4             !! points at which a step is looked at, its end included
    integer, parameter :: most_trials = 100
+   real(wp), parameter :: probe = 1.0e-4_wp      !! share of a step from its ends at which a slope is looked for
+   real(wp), parameter :: nearby = 0.25_wp       !! the interpolant is off by less than this part of what changes in a step
+   real(wp), parameter :: safety = 8.0_wp        !! and by less than so many times what it is off at a minimum
+   integer, parameter :: most_narrowings = 12    !! of the bracket of a minimum
+   real(wp), parameter :: small = 1.0e-3_wp      !! part of a bracket that is not worth another point
+   real(wp), parameter :: idle = 1.0e-3_wp       !! a minimum that would fall by less than this part of itself stays positive
 
 contains
 
@@ -26,11 +34,13 @@ contains
       logical, intent(out) :: found
       real(wp), intent(out) :: t                         !! of the event: the first time known to be behind it [s]
       real(wp), contiguous, intent(inout) :: y(:)        !! state there
-      real(wp) :: high(size(integrator%margin))
+      real(wp) :: high(size(integrator%margin)), values(size(integrator%margin), 0:n_looks)
       logical :: ok
-      integer :: i
+      integer :: i, last
 
       found = .false.
+      last = n_looks
+      values(:, 0) = integrator%margin
       do i = 1, n_looks
          t = t0 + (t1 - t0)*(real(i, wp)/n_looks)
          if (i == n_looks) then
@@ -40,20 +50,182 @@ contains
             call interpolate(real(i, wp)/n_looks, t1 - t0, y0, f0, y1, f1, y)
          end if
          call integrator%system%event_functions(t, y, high)
+         values(:, i) = high
          if (.not. any(crosses(integrator%margin, high))) cycle
          if (i < n_looks) then
             call integrator%state_within(t, y, ok)
             if (.not. ok) cycle
             call integrator%system%event_functions(t, y, high)
+            values(:, i) = high
             if (.not. any(crosses(integrator%margin, high))) cycle
          end if
+         found = .true.
+         last = i
+         exit
+      end do
+      if (any(may_dip(values(:, :last)))) &
+         call find_dip(integrator, t0, t1 - t0, y0, f0, y1, f1, values(:, :last), found, t, high, y)
+      if (found) then
          call close_in(integrator, t0, integrator%margin, t, high, y)
          integrator%crossed = crosses(integrator%margin, high)
-         found = .true.
-         return
-      end do
-      integrator%margin(:) = high
+      else
+         integrator%margin(:) = high
+      end if
    end subroutine find_event
+
+   !> Which functions may have crossed zero and come back between points where they are positive? A minimum between three
+   !> points is at most an eighth of their second difference below the middle one; there is room for four times that.
+   pure function may_dip(values)
+      real(wp), intent(in) :: values(:, 0:) !! functions at the points of a step
+      logical :: may_dip(size(values, 1))
+      may_dip = values(:, 0) > 0.0_wp .and. 2.0_wp*minval(values, dim=2) <= maxval(values, dim=2) .and. &
+                minval(values, dim=2) < maxval(values, dim=2)
+   end function may_dip
+
+   !> Seek such a crossing before the last point. If there is one, it takes the place of what was found.
+   subroutine find_dip(integrator, t0, h, y0, f0, y1, f1, values, found, t, high, y)
+      class(integrator_type), intent(inout) :: integrator
+      real(wp), intent(in) :: t0, h                    !! step [s]
+      real(wp), contiguous, intent(in) :: y0(:), f0(:), y1(:), f1(:)
+      real(wp), intent(in) :: values(:, 0:)            !! functions at the points, the first one of an event last
+      logical, intent(inout) :: found
+      real(wp), intent(inout) :: t                     !! upper end of a bracket of the event [s]
+      real(wp), intent(inout) :: high(:)               !! functions there
+      real(wp), contiguous, intent(inout) :: y(:)      !! state there
+      real(wp) :: x(0:n_looks + 2), v(size(values, 1), 0:n_looks + 2), here(size(values, 1)), y_try(size(y)), share
+      logical :: candidate(size(values, 1)), ok
+      integer :: i, j, last
+
+      last = ubound(values, 2)
+      candidate = may_dip(values)
+      x(:last) = [(real(i, wp)/n_looks, i=0, last)]
+      v(:, :last) = values
+      if (any(candidate .and. v(:, 0) <= v(:, 1))) call insert(1, probe) ! does it fall first?
+      if (.not. found .and. any(candidate .and. v(:, last) <= v(:, last - 1))) call insert(last, 1.0_wp - probe)
+      do i = 1, last - 1
+         do j = 1, size(candidate)
+            if (.not. candidate(j) .or. v(j, i) > min(v(j, i - 1), v(j, i + 1))) cycle
+            if (.not. dips(j, x(i - 1:i + 1), v(j, i - 1:i + 1), maxval(values(j, :)) - minval(values(j, :)))) cycle
+            found = .true.
+            t = t0 + share*h
+            high = here
+            y = y_try
+            return
+         end do
+      end do
+
+   contains
+
+      !> One more point, on the interpolant.
+      subroutine insert(place, new)
+         integer, intent(in) :: place
+         real(wp), intent(in) :: new !! share of the step
+         x(place + 1:last + 1) = x(place:last)
+         v(:, place + 1:last + 1) = v(:, place:last)
+         x(place) = new
+         call look(new)
+         v(:, place) = here
+         last = last + 1
+      end subroutine insert
+
+      !> All functions on the interpolant.
+      subroutine look(at)
+         real(wp), intent(in) :: at
+         call interpolate(at, h, y0, f0, y1, f1, y_try)
+         call integrator%system%event_functions(t0 + at*h, y_try, here)
+      end subroutine look
+
+      !> One of them on a state as accurate as the steps.
+      real(wp) function measured(which, at)
+         integer, intent(in) :: which
+         real(wp), intent(in) :: at
+         share = at
+         call integrator%state_within(t0 + at*h, y_try, ok)
+         if (ok) call integrator%system%event_functions(t0 + at*h, y_try, here)
+         measured = merge(here(which), huge(1.0_wp), ok)
+      end function measured
+
+      !> Is this function negative near its minimum inside a bracket? Then `here`, `y_try` and `share` are of such a place.
+      logical function dips(which, ends, at_ends, change)
+         integer, intent(in) :: which
+         real(wp), intent(in) :: ends(3), at_ends(3) !! bracket and its middle; functions there
+         real(wp), intent(in) :: change              !! of the function in the step
+         real(wp) :: a(3), f(3), off, curvature, reach, trial
+         integer :: k
+
+         dips = .false.
+         a = ends
+         f = at_ends
+         curvature = bend(a, f)
+         if (.not. curvature > 0.0_wp) return
+         do k = 1, most_narrowings
+            trial = vertex(a, f)
+            if (abs(trial - a(2)) <= small*(a(3) - a(1))) exit
+            call look(trial)
+            call narrow(a, f, trial, here(which))
+         end do
+         if (f(2) > nearby*change) return
+         off = f(2)
+         f(2) = measured(which, a(2))
+         dips = f(2) <= 0.0_wp
+         off = abs(f(2) - off)
+         if (dips .or. .not. ok .or. f(2) > safety*off) return
+         ! The minimum is where the interpolant has risen by less than it may be off, here and there.
+         reach = sqrt(4.0_wp*safety*off/curvature)
+         a([1, 3]) = [max(ends(1), a(2) - reach), min(ends(3), a(2) + reach)]
+         if (.not. (a(1) < a(2) .and. a(2) < a(3))) return
+         do k = 1, 3, 2
+            f(k) = measured(which, a(k))
+            dips = f(k) <= 0.0_wp
+            if (dips .or. .not. ok) return
+         end do
+         do k = 1, most_narrowings
+            if (f(2) > min(f(1), f(3))) return ! its minimum is not in the bracket
+            trial = vertex(a, f)
+            if (abs(trial - a(2)) <= small*(a(3) - a(1))) return
+            if (0.5_wp*bend(a, f)*(trial - a(2))**2 < idle*f(2)) return
+            off = measured(which, trial)
+            dips = off <= 0.0_wp
+            if (dips .or. .not. ok) return
+            call narrow(a, f, trial, off)
+         end do
+      end function dips
+
+   end subroutine find_dip
+
+   !> Second derivative of the parabola through three points.
+   pure real(wp) function bend(x, f)
+      real(wp), intent(in) :: x(3), f(3)
+      bend = 2.0_wp*((f(1) - f(2))/(x(2) - x(1)) + (f(3) - f(2))/(x(3) - x(2)))/(x(3) - x(1))
+   end function bend
+
+   !> Where it is lowest; the middle one is the lowest of the points.
+   pure real(wp) function vertex(x, f)
+      real(wp), intent(in) :: x(3), f(3)
+      real(wp) :: curvature, slope ! at the middle point
+      curvature = bend(x, f)
+      slope = (f(3) - f(2))/(x(3) - x(2)) - 0.5_wp*curvature*(x(3) - x(2))
+      vertex = x(2)
+      if (curvature > 0.0_wp) vertex = min(max(x(2) - slope/curvature, x(1)), x(3))
+   end function vertex
+
+   !> Take a new point into a bracket.
+   pure subroutine narrow(x, f, new, at_new)
+      real(wp), intent(inout) :: x(3), f(3)
+      real(wp), intent(in) :: new, at_new
+      integer :: side
+
+      side = merge(1, 3, new < x(2)) ! on which the new point is
+      if (at_new <= f(2)) then
+         x(4 - side) = x(2)
+         f(4 - side) = f(2)
+         x(2) = new
+         f(2) = at_new
+      else
+         x(side) = new
+         f(side) = at_new
+      end if
+   end subroutine narrow
 
    !> Did the functions become negative?
    elemental logical function crosses(before, after)

@@ -113,7 +113,7 @@ contains
       end if
       if (.not. associated(self%mechanics)) then
          call raise(error, "'gauss' cannot integrate this system (joint rotations that are states of their own: "// &
-                    "dampers = 'exact'; hinges that change their laws, which its long steps would not see)")
+                    "dampers = 'exact'; stops, freeplay, friction and latches of hinges, which its long steps would not see)")
          return
       end if
       self%system => system

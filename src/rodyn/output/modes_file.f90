@@ -56,9 +56,10 @@ contains
          call axis('rod', [(i, i=1, scene%n)], 'rod, counted from the spacecraft')
          if (size(scene%hinges%relaxing) > 0) &
             call axis('joint', scene%hinges%relaxing, 'hinge whose rotation is a state, counted from the spacecraft')
-         call names('coordinate', coordinate_names(scene, .false.), 'coordinate, as its change')
-         call names('rate', coordinate_names(scene, .true.), 'rate; of the spacecraft along the turning axes')
-         call names('equation', coordinate_names(scene, .true.), 'balance of forces in the row of this rate')
+         call names('coordinate', kept_names(scene, model, .false.), &
+                    'coordinate, as its change; without angles that locked hinges make redundant')
+         call names('rate', kept_names(scene, model, .true.), 'rate; of the spacecraft along the turning axes')
+         call names('equation', kept_names(scene, model, .true.), 'balance of forces in the row of this rate')
       end subroutine write_axes
 
       subroutine axis(name, values, long_name)
@@ -101,10 +102,11 @@ contains
 
       !> The state the equations are linearised about.
       subroutine write_state()
-         call write_vector(file, 'state', model%q, 'coordinate', 'm or rad', 'coordinates of the state', error)
-         call write_vector(file, 'state_rate', model%p, 'rate', 'm s-1 or rad s-1', 'rates of the state', error)
-         call write_vector(file, 'state_acceleration', model%acceleration, 'rate', 'm s-2 or rad s-2', &
-                           'rates of these rates', error)
+         call write_vector(file, 'state', model%q(model%kept), 'coordinate', 'm or rad', 'coordinates of the state', error)
+         call write_vector(file, 'state_rate', model%p(model%kept(:model%n)), 'rate', 'm s-1 or rad s-1', 'rates of the state', &
+                           error)
+         call write_vector(file, 'state_acceleration', model%acceleration(model%kept(:model%n)), 'rate', &
+                           'm s-2 or rad s-2', 'rates of these rates', error)
       end subroutine write_state
 
       subroutine write_matrices()
@@ -130,6 +132,20 @@ contains
       end subroutine write_summary
 
    end subroutine write_modes
+
+   !> Names of the coordinates that are kept, or of their rates.
+   function kept_names(scene, model, rates) result(names)
+      type(scene_type), intent(in) :: scene
+      type(linear_model), intent(in) :: model
+      logical, intent(in) :: rates
+      character(len=name_length), allocatable :: names(:)
+      names = coordinate_names(scene, rates)
+      if (rates) then
+         names = names(model%kept(:model%n))
+      else
+         names = names(model%kept)
+      end if
+   end function kept_names
 
    !> 'displacement_x', ..., 'phi_1', ... or those of the rates.
    function coordinate_names(scene, rates) result(names)

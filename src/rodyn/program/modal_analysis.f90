@@ -52,10 +52,10 @@ contains
       if (allocated(error)) return
       origin%title = config%title
       origin%resolved_input = resolved_case(config)
-      origin%notes = notes_on(scene, model%q(:scene%n_dof), .false.)
+      origin%notes = notes_on(motion%dynamics%scene, model%q(:scene%n_dof), .false.)
       origin%sundials_version = sundials_version()
       if (present(input_text)) origin%input = input_text
-      call write_modes(path, replace, origin, scene, model, modes, equilibrium, error)
+      call write_modes(path, replace, origin, motion%dynamics%scene, model, modes, equilibrium, error)
       if (allocated(error) .or. silent) return
       call print_table(modes)
       if (.not. equilibrium .and. .not. model%is_steady(modes%fastest)) write (output_unit, '(a)') &
@@ -63,7 +63,7 @@ contains
       write (output_unit, '(a)') 'file    '//path
    end subroutine analyse_modes
 
-   !> Linear model and modes of a case at t = 0.
+   !> Linear model and modes of a case at t = 0. Hinges have the laws that hold there: those that are held are locked.
    subroutine modes_at_start(motion, config, equilibrium, loads, with_shapes, model, modes, error)
       type(motion_type), intent(inout) :: motion !! without a ledger
       type(case_config), intent(in) :: config
@@ -76,6 +76,12 @@ contains
       if (.not. (loads .or. equilibrium)) call new_load_set(motion%dynamics%scene%loads, [load_config ::], config%t_end)
       call motion%dynamics%set_regime(0.0_wp, minval([motion%dynamics%scene%switches, config%t_end]))
       call initial_state(motion, config%initial, y)
+      if (motion%events%watches) then
+         associate (r => motion%n_q, m => motion%n_dof)
+            call motion%events%begin(motion%dynamics, y(1:r), y(r + 1:r + m), error)
+         end associate
+         if (allocated(error)) return
+      end if
       if (equilibrium) call find_equilibrium(motion, 0.0_wp, y, error)
       if (.not. allocated(error)) call new_linear_model(model, motion, 0.0_wp, y, error)
       if (.not. allocated(error)) call new_modes(modes, model, with_shapes, error)

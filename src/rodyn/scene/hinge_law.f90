@@ -391,7 +391,7 @@ contains
       if (.not. law%has_offsets) return
       do i = 1, size(law%relaxing)
          associate (k => law%relaxing(i))
-            theta_rate(i) = theta_rate(i) - (law%constant(k) + law%friction(k))/law%damping(k)
+            if (.not. law%locked(k)) theta_rate(i) = theta_rate(i) - (law%constant(k) + law%friction(k))/law%damping(k)
          end associate
       end do
    end subroutine relaxation_rates
@@ -429,19 +429,23 @@ contains
       softness = 0.5_wp*(f(1, :) + f(3, :) - sqrt((f(1, :) - f(3, :))**2 + 4.0_wp*f(2, :)**2))
    end function softness
 
-   !> Rotations of the relaxing hinges at the start: those of springs and rods in balance, dampers at rest.
-   subroutine initial_joints(law, phi, theta)
+   !> Rotations of the relaxing hinges at the start: those of springs and rods in balance, dampers at rest; where hinges are
+   !> locked, theirs.
+   subroutine initial_joints(law, phi, locked_at, theta)
       type(hinge_law), intent(in) :: law
-      real(wp), intent(in) :: phi(:)    !! chord angles (n) [rad]
-      real(wp), intent(out) :: theta(:) !! of the relaxing hinges [rad]
+      real(wp), intent(in) :: phi(:)        !! chord angles (n) [rad]
+      real(wp), intent(in) :: locked_at(0:) !! th of locked hinges, others are not read (0:n-1) [rad]
+      real(wp), intent(out) :: theta(:)     !! of the relaxing hinges [rad]
       type(three_moments) :: undamped
-      real(wp) :: all_joints(0:law%n - 1), bent(0:law%n - 1)
+      real(wp), dimension(0:law%n - 1) :: all_joints, bent
 
-      call new_three_moments(undamped, law%stiffness, law%series%flexibility, spread(.false., 1, law%n))
+      call new_three_moments(undamped, law%stiffness, law%series%flexibility, law%locked)
       call openings(law%n, .false., phi, all_joints)
-      call bend_by(law, law%constant, bent)
+      call bend_by(law, merge(0.0_wp, law%constant, law%locked), bent)
       all_joints = all_joints - (law%kink + bent)
+      where (law%locked) all_joints = all_joints - locked_at
       call undamped%solve(all_joints)
+      where (law%locked) all_joints = locked_at
       theta = all_joints(law%relaxing)
    end subroutine initial_joints
 

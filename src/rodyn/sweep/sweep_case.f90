@@ -182,7 +182,7 @@ contains
       do a = 1, size(sweep%axes)
          associate (axis => sweep%axes(a))
             if (is_ratio(axis)) cycle
-            call set_value(document, trim(axis%key), value_text(axis, rows(axis%dimension)), error)
+            call set_value(document, trim(axis%key), value_text(axis, rows(axis%dimension)), error, axis%in_list)
             if (allocated(error)) return
             if (axis%key /= 'model.inertia' .or. any(sweep%axes%key == 'model.bending')) cycle
             call follow_inertia(document, trim(sweep%base_case%model%bending), axis%texts(rows(axis%dimension)), error)
@@ -272,7 +272,7 @@ contains
       if (.not. allocated(error)) call new_motion(motion, scene, .false., error)
       if (allocated(error)) return
       t_end = config%t_end
-      if (sweep%frequencies > 0) call keep_frequencies(scene, config, keeper%kept, error)
+      if (sweep%frequencies > 0) call keep_frequencies(scene, config, sweep%at_equilibrium, keeper%kept, error)
       if (allocated(error) .or. .not. sweep%integrate) return
       motion%events%most = config%solver%max_events
       call initial_state(motion, config%initial, y)
@@ -291,10 +291,11 @@ contains
       call merge_times(config, sweep%probe_times, shape%outputs, times, keeper%probe_of, keeper%output_of)
    end subroutine prepare_case
 
-   !> The lowest natural frequencies at the initial state, rigid bodies and mechanisms left out.
-   subroutine keep_frequencies(scene, config, kept, error)
+   !> The lowest natural frequencies, rigid bodies and mechanisms left out.
+   subroutine keep_frequencies(scene, config, equilibrium, kept, error)
       type(scene_type), intent(in) :: scene
       type(case_config), intent(in) :: config
+      logical, intent(in) :: equilibrium !! at the one near the initial state, under loads; otherwise there, without loads
       type(case_result), intent(inout) :: kept
       type(error_type), allocatable, intent(out) :: error
       type(motion_type) :: motion !! of its own: matrices would stay with the one that is integrated
@@ -305,7 +306,7 @@ contains
       integer :: n
 
       call new_motion(motion, scene, .false., error)
-      if (.not. allocated(error)) call modes_at_start(motion, config, equilibrium=.false., loads=.false., with_shapes=.false., &
+      if (.not. allocated(error)) call modes_at_start(motion, config, equilibrium, loads=.false., with_shapes=.false., &
                                                      model=model, modes=modes, error=error)
       if (allocated(error)) return
       which = modes%oscillations()

@@ -20,6 +20,7 @@ module rodyn_sweep_config
       logical :: textual = .false.                    !! `texts`, otherwise `numbers`
       logical :: whole = .false.                      !! the numbers are integers
       logical :: bare = .false.                       !! the texts stand without quotes: .true., .false.
+      logical :: in_list = .false.                    !! the key is a list, as long as the base has it
       real(wp), allocatable :: numbers(:)
       character(len=:), allocatable :: texts(:)
       character(len=12) :: unit = ''
@@ -37,6 +38,7 @@ module rodyn_sweep_config
       real(wp) :: case_seconds = 0.0_wp                     !! wall time limit; 0: none
       logical :: lanes = .true.                             !! like cases may go side by side
       integer :: frequencies = 0                            !! natural frequencies that are kept of each case
+      logical :: at_equilibrium = .false.                   !! they are those there, not at the initial state
       logical :: integrate = .true.                         !! otherwise nothing else is computed
       type(sweep_axis), allocatable :: axes(:)
       integer :: n_dimensions = 0

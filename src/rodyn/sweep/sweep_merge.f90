@@ -207,6 +207,7 @@ contains
       type(case_shape), intent(in) :: shape
       integer, intent(in) :: block_cases
       type(error_type), allocatable, intent(out) :: error
+      character(len=:), allocatable :: state
       integer :: a, i
 
       if (shape%n_states > 0) then
@@ -217,7 +218,7 @@ contains
       end if
       if (shape%n_modes > 0) then
          if (.not. allocated(error)) call file%write('mode', [(i, i=1, shape%n_modes)], compression, error)
-         call describe('mode', '1', 'oscillation at the initial state, by rising natural frequency')
+         call describe('mode', '1', 'oscillation, by rising natural frequency')
       end if
       if (shape%n_rows > 0) then
          if (.not. allocated(error)) call file%write('row', [(i - 1, i=1, shape%n_rows)], compression, error)
@@ -240,8 +241,10 @@ contains
       call make('same_as', [integer ::], 'integer', '1', 'first case with the same values, the one that was computed')
       call make('wall_seconds', [integer ::], 'real', 's', 'wall time of the case')
       if (shape%n_modes > 0) then
-         call make('frequency', [shape%n_modes], 'real', 'rad s-1', 'natural frequency at the initial state')
-         call make('damping_ratio', [shape%n_modes], 'real', '1', 'damping ratio at the initial state')
+         state = 'at the initial state'
+         if (sweep%at_equilibrium) state = 'at the equilibrium'
+         call make('frequency', [shape%n_modes], 'real', 'rad s-1', 'natural frequency '//state)
+         call make('damping_ratio', [shape%n_modes], 'real', '1', 'damping ratio '//state)
       end if
       if (shape%n_states == 0) return
       do i = 1, shape%n_per_rod

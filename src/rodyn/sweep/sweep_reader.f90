@@ -17,7 +17,7 @@ module rodyn_sweep_reader
    use rodyn_namelist_edit, only: split_key
    use rodyn_namelist_parser, only: parse_document
    use rodyn_posix, only: parent_directory
-   use rodyn_schema, only: nearest_key, nearest_group, row_index, type_integer, type_logical, type_real
+   use rodyn_schema, only: any_list, group_index, nearest_key, nearest_group, row_index, type_integer, type_logical, type_real
    use rodyn_sweep_case, only: build_values
    use rodyn_sweep_config, only: sweep_axis, sweep_config, axis_size, is_ratio, value_text
    use rodyn_sweep_schema, only: sweep_extents, sweep_groups, sweep_rows
@@ -105,7 +105,7 @@ contains
       type(sweep_config), intent(inout) :: sweep
       logical, intent(in) :: base_is_sound
       type(field_loader) :: loader
-      character(len=name_length) :: combine
+      character(len=name_length) :: combine, at
       character(len=:), allocatable :: path
       integer :: i, n_axes
 
@@ -120,6 +120,9 @@ contains
       call loader%field('case_seconds', sweep%case_seconds)
       call loader%field('lanes', sweep%lanes)
       call loader%field('frequencies', sweep%frequencies)
+      at = 'start'
+      call loader%word_field('frequencies_at', at)
+      sweep%at_equilibrium = at == 'equilibrium'
       call loader%field('integrate', sweep%integrate)
       call loader%close_group()
       if (base_is_sound .and. .not. is_given(checked, 'sweep', 1, 'probe_times')) &
@@ -130,6 +133,8 @@ contains
          exit
       end do
 
+      if (sweep%at_equilibrium .and. sweep%frequencies == 0) &
+         call blame(checked, 'sweep', 1, 'frequencies_at', 'goes with frequencies only')
       if (.not. sweep%integrate) then
          if (sweep%frequencies == 0) call blame(checked, 'sweep', 1, 'integrate', &
                                                 'leaves nothing to compute unless frequencies is positive')
@@ -258,6 +263,7 @@ contains
       type(error_type), allocatable :: error
       character(len=:), allocatable :: group, name
       integer :: instance, paren, r, k
+      logical :: ok
 
       if (is_ratio(axis)) then
          axis%unit = '1'
@@ -288,12 +294,10 @@ contains
          call blame(checked, 'axis', i, 'key', 'has no influence on a case of a sweep')
          return
       end if
-      if (instance == 0 .and. group_count(sweep%base, group) > 1) then
-         call blame(checked, 'axis', i, 'key', 'the base has '//to_text(group_count(sweep%base, group))// &
-                    ' groups &'//group//'; say which, as in '//group//'(1).'//name)
-         return
-      end if
+      call check_instance(checked, i, group, instance, name, group_count(sweep%base, group), ok)
+      if (.not. ok) return
       axis%unit = case_rows(r)%unit
+      axis%in_list = case_rows(r)%extent == any_list
       axis%whole = case_rows(r)%type == type_integer
       axis%bare = case_rows(r)%type == type_logical
       select case (case_rows(r)%type)
@@ -313,17 +317,61 @@ contains
       end do
    end subroutine resolve_key
 
+   !> Is it clear which group of the base is meant? Those that may stand several times count from 1, in the order of the file.
+   subroutine check_instance(checked, i, group, instance, name, n, ok)
+      type(checked_document), intent(inout) :: checked
+      integer, intent(in) :: i                !! axis
+      character(len=*), intent(in) :: group, name
+      integer, intent(in) :: instance         !! 0: none was given
+      integer, intent(in) :: n                !! groups of that name in the base
+      logical, intent(out) :: ok
+      character(len=:), allocatable :: has
+
+      ok = .true.
+      has = 'the base has '//to_text(n)//' groups &'//group
+      if (n == 1) has = 'the base has one group &'//group
+      if (.not. case_groups(group_index(case_groups, group))%repeatable) then
+         ok = instance == 0
+         if (.not. ok) call blame(checked, 'axis', i, 'key', '&'//group//' stands once and takes no number: '//group//'.'//name)
+      else if (n == 0) then
+         ok = .false.
+         call blame(checked, 'axis', i, 'key', 'the base has no group &'//group)
+      else if (instance > n) then
+         ok = .false.
+         call blame(checked, 'axis', i, 'key', has//'; the number in parentheses counts them in the order of the file')
+      else if (instance == 0 .and. n > 1) then
+         ok = .false.
+         call blame(checked, 'axis', i, 'key', has//'; say which, as in '//group//'(1).'//name)
+      end if
+   end subroutine check_instance
+
+   !> The key as it would be with the number of its group, so that load.value and load(1).value are the same.
+   function full_key(key) result(text)
+      character(len=*), intent(in) :: key
+      character(len=:), allocatable :: text
+      character(len=:), allocatable :: group, name
+      type(error_type), allocatable :: error
+      integer :: instance
+
+      text = key
+      call split_key(key, group, instance, name, error)
+      if (.not. allocated(error)) text = group//'('//to_text(max(1, instance))//').'//name
+   end function full_key
+
    !> A mass ratio sets all node masses, so nothing else may.
    subroutine check_ratio(checked, sweep)
       type(checked_document), intent(inout) :: checked
       type(sweep_config), intent(in) :: sweep
-      integer :: i
+      integer :: i, k
 
       do i = 1, size(sweep%axes)
          if (index(sweep%axes(i)%key, 'chain.node_mass') == 1 .and. any(sweep%axes%key == 'mass_ratio')) &
             call blame(checked, 'axis', i, 'key', 'mass_ratio sets the node masses already')
-         if (any(sweep%axes(:i - 1)%key == sweep%axes(i)%key)) &
+         do k = 1, i - 1
+            if (full_key(trim(sweep%axes(k)%key)) /= full_key(trim(sweep%axes(i)%key))) cycle
             call blame(checked, 'axis', i, 'key', 'the key has an axis already')
+            exit
+         end do
       end do
    end subroutine check_ratio
 

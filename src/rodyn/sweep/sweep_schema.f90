@@ -25,11 +25,13 @@ module rodyn_sweep_schema
       schema_row('sweep', 'lanes', type_logical, default='.true.', &
          help='like cases by dop853 side by side in vector lanes, eight at once; false: one by one'), &
       schema_row('sweep', 'frequencies', type_integer, default='0', rule=in_range, low=0.0_wp, high=1.0e6_wp, &
-         help='natural frequencies and damping ratios to keep of each case at its initial state, from the lowest'), &
+         help='natural frequencies and damping ratios to keep of each case, from the lowest'), &
+      schema_row('sweep', 'frequencies_at', type_word, default="'start'", words='start|equilibrium', &
+         help='initial state without loads, or equilibrium near it under the loads of t = 0'), &
       schema_row('sweep', 'integrate', type_logical, default='.true.', &
          help='false: only the frequencies are computed'), &
       schema_row('axis', 'key', type_text, rule=up_to, high=80.0_wp, example="'mass_ratio'", &
-         help='group.name as in a case, with (3) for one element; or mass_ratio, of all nodes to all rods'), &
+         help='group.name, group.name(3) for one element, load(2).name for the second &load; or mass_ratio'), &
       schema_row('axis', 'values', type_real, any_list, default='depends', example='2, 4, 8', &
          when='this, text_values, or start to count', help='numbers'), &
       schema_row('axis', 'text_values', type_text, any_list, default='depends', &
