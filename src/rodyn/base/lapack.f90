@@ -142,6 +142,7 @@ contains
       n = size(a, 1)
       job = merge('V', 'N', with_vectors)
       allocate (values(n))
+      if (n == 0) return
       call dsygvd(1, job, 'L', n, a, n, m, n, values, work_size, -1, integer_size, -1, info)
       allocate (work(int(work_size(1))), integer_work(integer_size(1)))
       call dsygvd(1, job, 'L', n, a, n, m, n, values, work, size(work), integer_work, size(integer_work), info)
