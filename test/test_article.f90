@@ -1,4 +1,4 @@
-!> The article's scene against the numbers of MODEL sec. 6.
+!> The article's scene against the numbers of docs/accuracy.md, found by two other codes.
 module test_article
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type, raise
@@ -123,7 +123,7 @@ contains
       type(case_config) :: config
       type(scene_type) :: scene
       real(wp), allocatable :: frequency(:)
-      ! The last one is 2820.4 in MODEL; a brute-force mass matrix in double precision gives 2820.789 as well.
+      ! The last one was handed down as 2820.4; a brute-force mass matrix in double precision gives 2820.789 as well.
       real(wp), parameter :: expected(12) = [12.665_wp, 29.634_wp, 64.694_wp, 109.807_wp, 466.93_wp, 573.07_wp, &
                                              729.55_wp, 883.28_wp, 2059.6_wp, 2267.4_wp, 2564.5_wp, 2820.8_wp]
       call read_table1(config, error)

@@ -196,7 +196,7 @@ contains
       end do
    end subroutine shapes_of_jacobian
 
-   !> MODEL sec. 6, digits of which the last one, 2820.4, is 2820.79.
+   !> Published digits (docs/accuracy.md) of which the last one, 2820.4, is 2820.79.
    subroutine table_1(error)
       type(error_type), allocatable, intent(out) :: error
       real(wp), parameter :: known(12) = [12.665_wp, 29.634_wp, 64.694_wp, 109.807_wp, 466.93_wp, 573.07_wp, 729.55_wp, &

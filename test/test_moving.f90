@@ -41,6 +41,7 @@ contains
                new_test('power of drives balances energy in every kind of scene', test_drive_power), &
                new_test('a very stiff driven hinge follows its kink', test_stiff_drive), &
                new_test('a step of the kink works on the spring, and every method restarts there', test_kink_step), &
+               new_test('scenes whose hinges never change watch no events', test_nothing_to_watch), &
                new_test('a rod between two stops bounces as the closed form says', test_bounce), &
                new_test('a stop that is only grazed is seen, however short the touch', test_graze), &
                new_test('a damped stop pushes but never pulls', test_damped_stop), &
@@ -323,6 +324,38 @@ contains
       allocate (config%hinges(1))
       config%hinges(1) = hinge
    end subroutine add_hinge
+
+   !> No functions to watch with springs, driven kinks or prestress, in any kind of scene; one with a stop.
+   subroutine test_nothing_to_watch(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+      type(hinge_config) :: hinge
+      type(scene_type) :: scene
+      type(motion_type) :: motion
+      integer :: which
+
+      do which = 1, n_kinds
+         call random_case(config, which, 4)
+         config%kink_programs = four_programs()
+         call new_scene(scene, config, error)
+         if (.not. allocated(error)) call new_motion(motion, scene, .true., error)
+         if (.not. allocated(error)) call check(error, motion%n_events, 0, kind_name(which)//': event functions')
+         if (allocated(error)) return
+      end do
+      call one_rod(config, 1.0_wp, 0.0_wp)
+      hinge%rest_angle = 0.2_wp
+      call add_hinge(config, hinge)
+      call new_scene(scene, config, error)
+      if (.not. allocated(error)) call new_motion(motion, scene, .true., error)
+      if (.not. allocated(error)) call check(error, motion%n_events, 0, 'event functions with prestress')
+      if (allocated(error)) return
+      hinge%upper_stop = 0.3_wp
+      hinge%stop_stiffness = 1.0e3_wp
+      call add_hinge(config, hinge)
+      call new_scene(scene, config, error)
+      if (.not. allocated(error)) call new_motion(motion, scene, .true., error)
+      if (.not. allocated(error)) call check(error, motion%n_events, 1, 'event functions with a stop')
+   end subroutine test_nothing_to_watch
 
    !> Free flight between stops at -+b, half a sine of w = sqrt(Cs) in them: one period is 4 b/v + 2 pi/w.
    subroutine test_bounce(error)

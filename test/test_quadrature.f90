@@ -67,7 +67,7 @@ contains
       call check_close(error, sum(rule%weights), 1.0_wp, 1.0e-13_wp, 'sum of weights')
    end subroutine test_large_rule
 
-   !> MODEL sec. 3, uniform rod.
+   !> docs/model.md sec. 3, uniform rod.
    subroutine test_closed_forms(error)
       type(error_type), allocatable, intent(out) :: error
       type(gauss_rule) :: rule

@@ -1,4 +1,4 @@
-"""The model for the peers, written once: MODEL's recursion in plain arithmetic, for numbers (numba) and for expressions (heyoka).
+"""The model for the peers, written once: the recursion of docs/model.md in plain arithmetic, for numbers (numba) and for expressions (heyoka).
 
     scene = read_scene("table1.nml")
     flexible(scene.n, scene.rods, ...)          # under numba.njit, or with arrays of heyoka's expressions

@@ -13,7 +13,7 @@ from model import Scene, Segment
 
 
 def spring_and_damper(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """T = spring @ phi + damper @ phi' of hinges in series with bending, MODEL sec. 5."""
+    """T = spring @ phi + damper @ phi' of hinges in series with bending, docs/model.md sec. 5."""
     if scene.series is None:
         return np.zeros((1, 1)), np.zeros((1, 1))
     opening = np.eye(scene.n) - np.eye(scene.n, k=-1)

@@ -5,7 +5,7 @@ module rodyn_errors
    public :: error_type, raise
    public :: exit_done, exit_failed, exit_bad_input, exit_stopped
 
-   !> Exit codes of the program, SPEC "Commands".
+   !> Exit codes of the program, as `rodyn --help` lists them.
    integer, parameter :: exit_done = 0, exit_failed = 1, exit_bad_input = 2, exit_stopped = 75
 
    !> What went wrong, in words for the user.

@@ -5,7 +5,7 @@ module rodyn_resources
    use rodyn_kinds, only: wp
    implicit none (type, external)
    private
-   public :: free_memory, free_disk, gigabytes
+   public :: free_memory, free_disk, byte_text
 
    integer(c_int), parameter :: rlimit_as = 9     ! <sys/resource.h>, Linux
    real(wp), parameter :: unknown = 1.0e300_wp
@@ -83,17 +83,19 @@ contains
       close (unit)
    end function number_in
 
-   !> '1.5 GB'
-   pure function gigabytes(bytes) result(text)
+   !> A size in words, such as '1.5 GB'.
+   pure function byte_text(bytes) result(text)
       real(wp), intent(in) :: bytes
       character(len=:), allocatable :: text
       character(len=32) :: digits
-      if (bytes < 1.0e12_wp) then
-         write (digits, '(f12.1)') 1.0e-9_wp*bytes
+      if (bytes < 1.0e8_wp) then
+         write (digits, '(f12.1,a)') 1.0e-6_wp*bytes, ' MB'
+      else if (bytes < 1.0e12_wp) then
+         write (digits, '(f12.1,a)') 1.0e-9_wp*bytes, ' GB'
       else
-         write (digits, '(es9.1)') 1.0e-9_wp*bytes
+         write (digits, '(es9.1,a)') 1.0e-9_wp*bytes, ' GB'
       end if
-      text = trim(adjustl(digits))//' GB'
-   end function gigabytes
+      text = trim(adjustl(digits))
+   end function byte_text
 
 end module rodyn_resources

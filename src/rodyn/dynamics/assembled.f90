@@ -1,4 +1,4 @@
-!> The article's system  M(q) p' + N(q) z + D p + K q = Q1 + Q2  in full, MODEL sec. 3: O(n^3).
+!> The article's system  M(q) p' + N(q) z + D p + K q = Q1 + Q2  in full, docs/model.md sec. 3: O(n^3).
 !>
 !> Written independently of the recursion, as the second route to the same accelerations. For the columns of N,
 !>     z = (w Vx, w Vy, w^2, phi_m'(2 w + phi_m'), (w + phi_m') alpha_m', (w + phi_m') beta_m'),  m = 1..n;

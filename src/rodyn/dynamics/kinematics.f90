@@ -1,4 +1,4 @@
-!> Positions, velocities, energies and momenta of a scene in a given state, MODEL sec. 1 and 2. O(n).
+!> Positions, velocities, energies and momenta of a scene in a given state, docs/model.md sec. 1 and 2. O(n).
 module rodyn_kinematics
    use rodyn_kinds, only: wp
    use rodyn_scene, only: scene_type

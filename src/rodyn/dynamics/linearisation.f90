@@ -123,7 +123,7 @@ contains
       end associate
    end subroutine inward_pass
 
-   !> Rows of rod k, MODEL sec. 3, and its share of the force on the inner node.
+   !> Rows of rod k, docs/model.md sec. 3, and its share of the force on the inner node.
    pure subroutine add_rod(scene, k, q, p, a, dq, dp, e, n, w, dw, wr, inner, d_inner, moment, force, d_force, dr)
       type(scene_type), intent(in) :: scene
       integer, intent(in) :: k

@@ -105,7 +105,7 @@ contains
 
    end subroutine initial_state
 
-   !> y' = (q', p' [, powers]). The displacement of C is measured along the turning axes, MODEL sec. 1.
+   !> y' = (q', p' [, powers]). The displacement of C is measured along the turning axes, docs/model.md sec. 1.
    subroutine rhs(self, t, y, ydot, ok)
       class(motion_type), intent(inout) :: self
       real(wp), intent(in) :: t

@@ -1,4 +1,4 @@
-!> Accelerations of a chain of flexible rods in O(n), MODEL sec. 3 and 4.2.
+!> Accelerations of a chain of flexible rods in O(n), docs/model.md sec. 3 and 4.2.
 !>
 !> Seen from its inner node, the chain from rod k outward is an apparent mass P (2x2, symmetric) and a bias
 !> force b:  f = P A + b  with A the acceleration of the node. From the tip inward, rod k is added by

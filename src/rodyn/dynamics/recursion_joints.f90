@@ -1,5 +1,5 @@
 !> Accelerations in O(n) of a chain of every kind of rod, with or without the bubble, of whose hinges any may be locked:
-!> MODEL sec. 4.2 with moments.
+!> docs/model.md sec. 4.2 with moments.
 !>
 !> A free hinge passes a force and a moment that is known (T of its spring and damper). A locked one passes a moment that
 !> is not known, but makes the angular accelerations of the two end tangents equal, up to a given sigma. So the chain
@@ -111,7 +111,7 @@ contains
       inertia(2, 2) = inertia(2, 2) + mass
    end subroutine add_node
 
-   !> H and h of rod k, MODEL sec. 3, and of the chain that it carries: node k accelerates by A + l n W' - l W^2 e, its
+   !> H and h of rod k, docs/model.md sec. 3, and of the chain that it carries: node k accelerates by A + l n W' - l W^2 e, its
    !> end tangent by W' + beta''. Formed in (A, W', x) and brought to tau = W' + alpha''.
    pure subroutine rod_equations(scene, bending, k, q, p, elastic, inertia, bias, pass, h, c)
       type(scene_type), intent(in) :: scene

@@ -1,4 +1,4 @@
-!> Accelerations of a chain of massless rods between point masses in O(n), MODEL sec. 5 (`lumped`).
+!> Accelerations of a chain of massless rods between point masses in O(n), docs/model.md sec. 5 (`lumped`).
 !>
 !> A massless rod pulls and pushes only along itself, apart from the couple T_k - T_{k-1}: seen from its inner
 !> node, the chain from rod k outward is  f = a Ae e + b  with one axial apparent mass

@@ -1,4 +1,4 @@
-!> Accelerations of a chain of rigid rods with distributed mass in O(n): MODEL sec. 4.2 without alpha, beta.
+!> Accelerations of a chain of rigid rods with distributed mass in O(n): docs/model.md sec. 4.2 without alpha, beta.
 !>
 !> The recursion of `rodyn_recursion_flexible` with v = 0; see there for the notation and for why the products
 !> are multiplied out.

@@ -71,7 +71,7 @@ contains
 
    end subroutine check_spacecraft
 
-   !> MODEL sec. 5: which bending goes with which inertia.
+   !> docs/model.md sec. 5: which bending goes with which inertia.
    subroutine check_model(checked, config)
       type(checked_document), intent(inout) :: checked
       type(case_config), intent(in) :: config

@@ -12,7 +12,7 @@ contains
 
    !> Fill `row` from the state y at time t. The residual is
    !>     (kinetic + elastic + dissipated - work)(t) - (kinetic + elastic)(0),
-   !> zero but for the integrator's error in a `consistent` scene, MODEL sec. 6.
+   !> zero but for the integrator's error in a `consistent` scene, docs/model.md sec. 6.
    pure subroutine fill_row(motion, t, y, initial_energy, row)
       type(motion_type), intent(in) :: motion
       real(wp), intent(in) :: t              !! [s]

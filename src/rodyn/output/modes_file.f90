@@ -1,4 +1,4 @@
-!> The modes of a scene as an HDF5 file, SPEC "rodyn modes".
+!> The modes of a scene as an HDF5 file, docs/modes.md.
 !>
 !> Over (mode, rod), (mode) or (mode, joint): each coordinate of the shapes as two data sets, NAME_real and NAME_imag, since
 !> HDF5 has no complex numbers. Over (equation, rate) and (equation, coordinate): the matrices of the linear model.

@@ -1,4 +1,4 @@
-!> The result of one run as an HDF5 file, SPEC "Run file".
+!> The result of one run as an HDF5 file; `rodyn_run_layout` has the names in it.
 !>
 !>     call check_output_path(path, force, error)      ! early, before computing
 !>     call run%create(path, header, force, error)

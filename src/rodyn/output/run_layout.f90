@@ -1,4 +1,4 @@
-!> What a run file holds: names, dimensions, units and meanings, SPEC "Run file". They stand here and nowhere else.
+!> What a run file holds: names, dimensions, units and meanings. They stand here and nowhere else.
 module rodyn_run_layout
    implicit none (type, external)
    private

@@ -1,6 +1,6 @@
 !> Whether a run stayed where its model holds, judged at the output times.
 !>
-!> Two things are left out for rods that bend (MODEL sec. 1):
+!> Two things are left out for rods that bend (docs/model.md sec. 1):
 !> - The chord keeps its length, although bending by v shortens it by int v'^2/2, a part
 !>       (alpha^2/15 - alpha beta/30 + beta^2/15) = (8/3) (v_max/l)^2 for a rod bent to an arc (beta = -alpha)
 !>   of l: 1 % where v_max = 0.06 l, which is the default of `deflection_limit`.

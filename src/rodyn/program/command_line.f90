@@ -1,4 +1,4 @@
-!> The commands of the program, SPEC "Commands".
+!> The commands of the program: `rodyn --help`.
 module rodyn_command_line
    use, intrinsic :: iso_fortran_env, only: error_unit
    use rodyn_errors, only: error_type, raise, exit_done, exit_bad_input

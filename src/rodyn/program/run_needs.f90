@@ -4,7 +4,7 @@ module rodyn_run_needs
    use rodyn_case_config, only: case_config
    use rodyn_errors, only: error_type, raise, exit_bad_input
    use rodyn_posix, only: parent_directory
-   use rodyn_resources, only: free_disk, free_memory, gigabytes
+   use rodyn_resources, only: free_disk, free_memory, byte_text
    use rodyn_text, only: to_text
    implicit none (type, external)
    private
@@ -28,15 +28,14 @@ contains
 
       rows = real(config%n_outputs, wp) + 1.0_wp
       memory = of_program + memory_of_scene(config)
-      call check_memory('n_rods = '//to_text(config%chain%n_rods)//", kernel = '"//trim(config%model%kernel)// &
-                        "', n_outputs = "//to_text(config%n_outputs), memory, error)
+      call check_memory('n_rods = '//to_text(config%chain%n_rods)//", kernel = '"//trim(config%model%kernel)//"'", memory, error)
       if (allocated(error)) return
       disk = word*rows*states_that_move(config)
       if (config%output%compression > 0) disk = disk*least_compressed
       if (disk > free_disk(parent_directory(path))) &
          call raise(error, path//': n_outputs = '//to_text(config%n_outputs)//' rows of '//to_text(config%chain%n_rods)// &
-                    ' rods: needs about '//gigabytes(disk)//' of disk, but only '// &
-                    gigabytes(free_disk(parent_directory(path)))//' are free', exit_bad_input)
+                    ' rods: needs about '//byte_text(disk)//' of disk, but only '// &
+                    byte_text(free_disk(parent_directory(path)))//' are free', exit_bad_input)
    end subroutine check_needs
 
    !> Refuse what needs more memory than there is.
@@ -44,8 +43,8 @@ contains
       character(len=*), intent(in) :: what
       real(wp), intent(in) :: needed !! [bytes]
       type(error_type), allocatable, intent(out) :: error
-      if (needed > free_memory()) call raise(error, what//': needs about '//gigabytes(needed)//' of memory, but only '// &
-                                             gigabytes(free_memory())//' are free', exit_bad_input)
+      if (needed > free_memory()) call raise(error, what//': needs about '//byte_text(needed)//' of memory, but only '// &
+                                             byte_text(free_memory())//' are free', exit_bad_input)
    end subroutine check_memory
 
    !> Memory of a scene, its integrator and one row of results [bytes]; measured, see docs/stability_input.md.
@@ -54,7 +53,7 @@ contains
       real(wp) :: n, n_dof
 
       n = real(config%chain%n_rods, wp)
-      n_dof = n*merge(3.0_wp, 1.0_wp, config%model%bending == 'dynamic')
+      n_dof = n*merge(1.0_wp + config%model%bending_shapes, 1.0_wp, config%model%bending == 'dynamic')
       memory_of_scene = n*bytes_per_rod(config)
       if (config%model%kernel == 'assembled') memory_of_scene = memory_of_scene + word*matrices*n_dof**2
    end function memory_of_scene
@@ -76,7 +75,9 @@ contains
    !> Numbers of a row that change with time and so hardly compress.
    pure real(wp) function states_that_move(config)
       type(case_config), intent(in) :: config
-      states_that_move = 1.0_wp + merge(2.0_wp, 6.0_wp, config%model%bending == 'rigid')*config%chain%n_rods
+      states_that_move = 1.0_wp + 2.0_wp*config%chain%n_rods
+      if (config%model%bending /= 'rigid') &
+         states_that_move = states_that_move + 2.0_wp*config%model%bending_shapes*config%chain%n_rods
       if (config%spacecraft%motion == 'free') states_that_move = states_that_move + 6.0_wp
    end function states_that_move
 

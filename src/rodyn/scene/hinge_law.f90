@@ -1,4 +1,4 @@
-!> Moments of the visco-elastic hinges, MODEL sec. 1, 2 and 5.
+!> Moments of the visco-elastic hinges, docs/model.md sec. 1, 2 and 5.
 !>
 !> With joint rotation th and its rate, T = C th + D th' + t0 + f. Kinks may move (`rodyn_kink_program`); t0 and f, the moment
 !> of sliding friction, are zero but for mechanisms (`rodyn_hinge_mechanism`), whose C, D, t0 and f change at events. What

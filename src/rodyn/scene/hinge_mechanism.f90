@@ -1,4 +1,4 @@
-!> Hinges that are more than a spring and a damper: freeplay, stops, dry friction, locks, SPEC `&hinge`.
+!> Hinges that are more than a spring and a damper: freeplay, stops, dry friction, locks: `&hinge`, docs/moving_scenes.md.
 !>
 !> Between events every such hinge is linear again,
 !>     T = C th + D th' + t0 + f,

@@ -1,4 +1,5 @@
-!> Driven kinks: breaks gamma_k(t) of the axis that move by a program, SPEC `&kink_program`.
+!> Driven kinks: breaks gamma_k(t) of the axis that move by a program: `&kink_program`,
+!> docs/moving_scenes.md.
 !>
 !> The kink of a hinge is that of `&chain` plus all its programs. A program moves between t_start and t_end; before, it
 !> has its first value, after, its last. Between two neighbouring switch times every program is smooth.

@@ -1,4 +1,4 @@
-!> Forces and moments as functions of time, MODEL sec. 2, SPEC `&load`.
+!> Forces and moments as functions of time, docs/model.md sec. 2, and `&load`.
 !>
 !> A load is zero outside [t_start, t_end]. Between two neighbouring switch times nothing appears, vanishes or
 !> bends: such an interval is a regime, chosen once, in which constant loads are mere numbers and a load that

@@ -43,7 +43,7 @@ contains
       text = text//', w = '//trim(adjustl(digits))//' rad/s)'//remedy
    end function notes_on
 
-   !> Largest (D w/C)^2 of the hinges, w the highest natural frequency, MODEL sec. 5: the relative size of what
+   !> Largest (D w/C)^2 of the hinges, w the highest natural frequency, docs/model.md sec. 5: the relative size of what
    !> quasistatic bending with reduced dampers leaves out. Zero where nothing is left out or nobody looks.
    subroutine neglected_damping(scene, q, term, hinge, frequency)
       type(scene_type), intent(in) :: scene

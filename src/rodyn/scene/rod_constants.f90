@@ -143,7 +143,7 @@ contains
       finer = composite_rule(piece, profile%breaks())
    end function rule_for
 
-   !> Eliminate alpha'', beta'' from the inertia of a rod, MODEL sec. 4.
+   !> Eliminate alpha'', beta'' from the inertia of a rod, docs/model.md sec. 4.
    pure subroutine reduce(rod, ok)
       type(rod_constants), intent(inout) :: rod
       logical, intent(out) :: ok !! B positive definite

@@ -1,4 +1,4 @@
-!> Shape functions of a rod and the inertia integrals over them, MODEL sec. 1 and 3.
+!> Shape functions of a rod and the inertia integrals over them, docs/model.md sec. 1 and 3.
 module rodyn_rod_integrals
    use rodyn_kinds, only: wp
    use rodyn_quadrature, only: gauss_rule

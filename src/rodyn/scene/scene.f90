@@ -151,7 +151,7 @@ contains
       end do
    end subroutine collect_switches
 
-   !> What a combination of choices forbids, MODEL sec. 5.
+   !> What a combination of choices forbids, docs/model.md sec. 5.
    subroutine check_combination(config, error)
       type(case_config), intent(in) :: config
       type(error_type), allocatable, intent(out) :: error

@@ -1,4 +1,4 @@
-!> The spacecraft at the root of the chain, MODEL sec. 3 and 4.2.
+!> The spacecraft at the root of the chain, docs/model.md sec. 3 and 4.2.
 module rodyn_spacecraft
    use rodyn_kinds, only: wp
    implicit none (type, external)

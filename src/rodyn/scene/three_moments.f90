@@ -1,4 +1,4 @@
-!> The three-moment equation of massless rods in series with hinges, MODEL sec. 5.
+!> The three-moment equation of massless rods in series with hinges, docs/model.md sec. 5.
 !>
 !> A massless rod with end moments -T_{k-1}, +T_k bends by
 !>     alpha_k = -(f11 T_{k-1} + f12 T_k),   beta_k = f12 T_{k-1} + f22 T_k,   T_n = 0

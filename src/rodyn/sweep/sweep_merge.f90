@@ -1,4 +1,4 @@
-!> From shards to the content of `sweep.h5`, SPEC "Sweep file", case after case.
+!> From shards to the content of `sweep.h5` (docs/sweeps.md), case after case.
 !>
 !> What is in it depends on the sweep alone, not on who computed which case when; only `wall_seconds` differs.
 module rodyn_sweep_merge
