@@ -54,7 +54,27 @@ def measure(part: str) -> None:
         text = "".join(f"# {scene}\n" + output_of([program, "drift", scene, *job]) for scene, *job in jobs)
     else:
         text = output_of([example(), part])
+    if part == "orders":
+        (RESULTS / "orders_quad.txt").write_text(output_of([quad_orders()]))
     (RESULTS / f"{part}.txt").write_text(text)
+
+
+#: What `gauss` consists of, in the order of compilation; before it `kinds.f90` with another precision.
+GAUSS = ["base/lanes", "base/errors", "base/lapack", "scene/quadrature", "dynamics/trigonometry", "integration/dense_newton",
+         "integration/ode", "integration/integrator", "integration/lane_algebra", "integration/gauss_collocation",
+         "integration/gauss_integrator"]
+
+
+def quad_orders() -> str:
+    """Path of the program that measures the order of `gauss` in quadruple precision."""
+    place, sources = RESULTS / "quad", ROOT / "src" / "rodyn"
+    place.mkdir(parents=True, exist_ok=True)
+    (place / "kinds.f90").write_text((sources / "base" / "kinds.f90").read_text().replace("real64", "real128"))
+    program = place / "quad_orders"
+    subprocess.run([os.environ.get("FPM_FC", "mpifort"), "-O2", "-fimplicit-none", f"-J{place}", "-o", program, place / "kinds.f90",
+                    *(sources / f"{name}.f90" for name in GAUSS), ROOT / "bench/stability/quad_orders/main.f90", "-llapack", "-lblas"],
+                   check=True)
+    return str(program)
 
 
 def output_of(command: list[str]) -> str:
@@ -120,7 +140,14 @@ def limits_table() -> str:
 def orders_table() -> str:
     return table(["method", "halvings", "slope", "foretold", "first h ω", "errors of six steps"],
                  [[named(*row[:2]), f"{float(row[2]):g}", f"{float(row[3]):.2f}", f"{float(row[4]):.2f}", f"{float(row[5]):.2f}",
-                   ", ".join(map(short, row[6:]))] for row in rows("orders")])
+                   ", ".join(map(short, row[6:]))] for row in rows("orders")] + [quad_row()])
+
+
+def quad_row() -> list[str]:
+    """`gauss` on Kepler's problem in quadruple precision; the first of its steps is 1."""
+    errors = [float(text) for text in rows("orders_quad")[0][1:]]
+    slope = -np.polyfit(np.arange(len(errors)), np.log2(errors), 1)[0]
+    return ["`gauss` 16, real128", str(len(errors) - 1), f"{slope:.2f}", "–", "1.00", ", ".join(short(str(e)) for e in errors)]
 
 
 def tolerances_table() -> str:

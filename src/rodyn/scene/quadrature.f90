@@ -12,7 +12,7 @@ module rodyn_quadrature
    end type gauss_rule
 
    !> The roots crowd at the ends, where the weights lose digits like n^2: they are computed with more of them.
-   integer, parameter :: ep = selected_real_kind(18)
+   integer, parameter :: ep = max(wp, selected_real_kind(precision(1.0_wp) + 3))
    real(ep), parameter :: pi = acos(-1.0_ep)
 
 contains
