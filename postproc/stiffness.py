@@ -49,7 +49,7 @@ def name_of(method: str) -> str:
 
 
 def colour(i: int) -> str:
-    return ["#BBBBBB", "#E69F00", "#56B4E9"][i % 3]
+    return ["#DDDDDD", "#E69F00", "#56B4E9", "#7FC8A9"][i % 4]
 
 
 def scenes(runs: dict[str, np.ndarray]) -> list[tuple[float, float, np.ndarray]]:

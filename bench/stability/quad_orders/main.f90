@@ -153,6 +153,7 @@ contains
 end program quad_orders
 
 !> In place of LAPACK's, which knows no quadruple precision: the eigenvalues of A serve stiff modes only, and there are none.
+! allow(procedure-not-in-module)
 subroutine dgeev(jobvl, jobvr, n, a, lda, wr, wi, vl, ldvl, vr, ldvr, work, lwork, info)
    use rodyn_kinds, only: wp
    implicit none (type, external)
