@@ -1,7 +1,7 @@
 """Natural frequencies of a run's scene about its initial configuration, from the input that the file carries.
 
 M by integrals over the rods that are exact for their cubics, K of hinges and rods in closed form: K x = w^2 M x. For uniform
-rods; `rodyn modes` knows the others.
+rods and hinges without laws of their own; `rodyn modes` knows the others.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ GAUSS_X, GAUSS_W = 0.5 * (_X + 1.0), 0.5 * _W
 
 
 def natural_frequencies(run: Run) -> np.ndarray:
-    """All frequencies above zero, rising [rad/s]; none if some rod is not uniform."""
-    if "rod_profile" in run.scene():
+    """All frequencies above zero, rising [rad/s]; none if some rod is not uniform or some hinge has a law."""
+    if not {"rod_profile", "hinge"}.isdisjoint(run.scene()):
         return np.array([])
     mass, stiffness = matrices(run)
     lower = np.linalg.cholesky(mass)

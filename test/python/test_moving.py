@@ -8,7 +8,9 @@ import histories
 import numpy as np
 import pytest
 import result_files
+import spectrum
 import xarray
+from natural_frequencies import natural_frequencies
 from rodyn_data import open_run
 
 CASES = result_files.ROOT / "cases"
@@ -62,6 +64,13 @@ def test_events_are_marked_in_histories(deployment, tmp_path):
     (axes,) = [a for a in figure.axes if a.get_visible()]
     marks = [line for line in axes.lines if line.get_linestyle() == ":" and len(set(line.get_xdata())) == 1]
     assert len(marks) == 5  # one release by time, four latchings that release the next
+
+
+def test_a_spectrum_has_no_natural_frequencies_of_hinges_that_change(deployment, tmp_path):
+    with open_run(deployment[0]) as result:
+        assert natural_frequencies(result).size == 0
+    figure = spectrum.plot(deployment[0], tmp_path / "s.png", ["phi(1)"])
+    assert len(figure.axes[0].lines) == 1
 
 
 def test_a_case_without_laws_of_hinges_has_no_events(runs):
