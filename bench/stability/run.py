@@ -185,7 +185,7 @@ def extremes_table() -> str:
         done = [row for row in cases if row[2] == "done"]
         worst = [max(float(row[i]) for row in done) for i in (4, 5, 6, 7)]
         body.append([name, str(len(cases)), *(str(sum(row[2] == status for row in cases)) for status in ("done", "slow", "refused", "failed")),
-                     *map(short, map(str, worst))])
+                     *(short(str(value)) if value >= 0.0 else "–" for value in worst)])  # the other kernel may have run out of time
     return table(["family", "cases", "done", "time up", "refused", "failed", "energy", "momentum", "angular", "other kernel, rad"], body)
 
 

@@ -80,7 +80,8 @@ contains
             model%n_free_hinges = count(law%stiffness <= 0.0_wp .and. .not. law%locked)
             model%n_idle_hinges = count(law%stiffness <= 0.0_wp .and. law%damping <= 0.0_wp .and. .not. law%locked)
          end associate
-         model%kept = [free_coordinates(scene), m + moving]
+         model%kept = free_coordinates(scene)
+         if (model%n_joints > 0) model%kept = [model%kept, m + moving]
          model%n = size(model%kept) - model%n_joints
          if (model%n_joints < r - m) then
             model%stiffness = model%stiffness(:, model%kept)
