@@ -71,7 +71,7 @@ contains
          end if
          model%mass = motion%system%m
          model%stiffness = by_state(:, :r)
-         allocate (model%damping(m, m), source=0.0_wp)
+         allocate (model%damping(m, m), model%gyration(m, m), source=0.0_wp)
          if (r == m) model%damping = motion%system%d
          model%gyration = by_state(:, r + 1:) - model%damping
          model%loaded = any(abs(forces%base) > 0.0_wp)
