@@ -10,7 +10,7 @@ module test_motions
    use test_testing, only: check
    implicit none (type, external)
    private
-   public :: motion_of, random_motion, check_jacobian, check_energy_rate
+   public :: motion_of, random_motion, check_jacobian, check_energy_rate, eigenvector_error
 
 contains
 
@@ -97,5 +97,21 @@ contains
          call check(error, ok .and. abs(rate - (power(1) - power(2))) < 1.0e-5_wp*scale, name//': energy does not balance')
       end associate
    end subroutine check_energy_rate
+
+   !> Residual of an eigenvector of the Jacobian made of a mode, relative to both.
+   real(wp) function eigenvector_error(motion, jac, y, shape, eigenvalue)
+      type(motion_type), intent(in) :: motion
+      real(wp), intent(in) :: jac(:, :), y(:) !! the Jacobian at state y
+      complex(wp), intent(in) :: shape(:)     !! change of q (n_q)
+      complex(wp), intent(in) :: eigenvalue   !! [1/s]
+      complex(wp) :: v(motion%n_q + motion%n_dof)
+
+      associate (r => motion%n_q)
+         v = [shape, eigenvalue*shape(:motion%n_dof)]
+         ! dp = dq' less the terms of the turning axes, in which the spacecraft's position is.
+         if (motion%free) v(r + 1:r + 2) = v(r + 1:r + 2) - y(r + 3)*[v(2), -v(1)] - v(r + 3)*[y(2), -y(1)]
+      end associate
+      eigenvector_error = maxval(abs(matmul(jac, v) - eigenvalue*v))/(maxval(abs(jac))*maxval(abs(v)))
+   end function eigenvector_error
 
 end module test_motions

@@ -11,7 +11,7 @@ module test_modes
    use rodyn_modes, only: mode_set, new_modes, rigid_body, mechanism, oscillation
    use rodyn_motion, only: motion_type, new_motion
    use rodyn_scene, only: scene_type, new_scene
-   use test_motions, only: motion_of
+   use test_motions, only: motion_of, eigenvector_error
    use test_random_scenes, only: allocate_case, kind_name, n_kinds, random_case, seed_random
    use test_testing, only: check, check_close, new_test, unittest
    implicit none (type, external)
@@ -165,11 +165,9 @@ contains
       type(motion_type) :: motion
       type(mode_set) :: modes
       real(wp), allocatable :: y(:), jac(:, :)
-      complex(wp), allocatable :: v(:)
-      complex(wp) :: lambda
       real(wp) :: wrong
       logical :: ok
-      integer :: which, n, i, r, m
+      integer :: which, n, i
 
       call seed_random(13)
       do which = 1, n_kinds
@@ -178,17 +176,12 @@ contains
             call motion_of(motion, y, config, error, ledger=.false.)
             if (.not. allocated(error)) call modes_of(motion, y, modes, error)
             if (allocated(error)) return
-            r = motion%n_q
-            m = motion%n_dof
             if (allocated(jac)) deallocate (jac)
-            allocate (jac(r + m, r + m))
+            allocate (jac(motion%n_controlled, motion%n_controlled))
             call motion%jacobian(0.0_wp, y, jac, ok)
             do i = 1, modes%n
-               lambda = modes%eigenvalue(i)
-               if (abs(lambda) < 1.0e-3_wp) cycle
-               v = [modes%shape(:, i), lambda*modes%shape(:m, i)]
-               if (motion%free) v(r + 1:r + 2) = v(r + 1:r + 2) - y(r + 3)*[v(2), -v(1)] - v(r + 3)*[y(2), -y(1)]
-               wrong = maxval(abs(matmul(jac, v) - lambda*v))/(maxval(abs(jac))*maxval(abs(v)))
+               if (abs(modes%eigenvalue(i)) < 1.0e-3_wp) cycle
+               wrong = eigenvector_error(motion, jac, y, modes%shape(:, i), modes%eigenvalue(i))
                call check(error, wrong < 1.0e-10_wp, kind_name(which)//': not an eigenvector')
                if (allocated(error)) return
             end do

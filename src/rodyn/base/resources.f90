@@ -3,6 +3,7 @@
 module rodyn_resources
    use, intrinsic :: iso_c_binding, only: c_char, c_int, c_int64_t, c_null_char
    use rodyn_kinds, only: wp
+   use rodyn_text, only: formatted
    implicit none (type, external)
    private
    public :: free_memory, free_disk, byte_text
@@ -87,15 +88,13 @@ contains
    pure function byte_text(bytes) result(text)
       real(wp), intent(in) :: bytes
       character(len=:), allocatable :: text
-      character(len=32) :: digits
       if (bytes < 1.0e8_wp) then
-         write (digits, '(f12.1,a)') 1.0e-6_wp*bytes, ' MB'
+         text = formatted(1.0e-6_wp*bytes, '(f12.1)')//' MB'
       else if (bytes < 1.0e12_wp) then
-         write (digits, '(f12.1,a)') 1.0e-9_wp*bytes, ' GB'
+         text = formatted(1.0e-9_wp*bytes, '(f12.1)')//' GB'
       else
-         write (digits, '(es9.1,a)') 1.0e-9_wp*bytes, ' GB'
+         text = formatted(1.0e-9_wp*bytes, '(es9.1)')//' GB'
       end if
-      text = trim(adjustl(digits))
    end function byte_text
 
 end module rodyn_resources

@@ -5,7 +5,7 @@ module rodyn_text
    implicit none (type, external)
    private
    public :: lower, is_name, is_digit
-   public :: to_text, short_text, quoted, printable, as_utf8, ends_with
+   public :: to_text, formatted, short_text, quoted, printable, as_utf8, ends_with
    public :: edit_distance, word_count, word
 
    !> A number as the shortest text (integer), or with 17 significant digits (real), or as T or F.
@@ -56,9 +56,7 @@ contains
    pure function real_text(x) result(text)
       real(wp), intent(in) :: x
       character(len=:), allocatable :: text
-      character(len=25) :: digits
-      write (digits, '(es25.16e3)') x
-      text = trim(adjustl(digits))
+      text = formatted(x, '(es25.16e3)')
    end function real_text
 
    pure function logical_text(x) result(text)
@@ -181,10 +179,18 @@ contains
    pure function short_text(x) result(text)
       real(wp), intent(in) :: x
       character(len=:), allocatable :: text
-      character(len=16) :: digits
-      write (digits, '(g0.6)') x
+      text = formatted(x, '(g0.6)')
+   end function short_text
+
+   !> A number as a format has it, without blanks.
+   pure function formatted(x, format) result(text)
+      real(wp), intent(in) :: x
+      character(len=*), intent(in) :: format !! such as '(f8.1)'; at most 32 characters wide
+      character(len=:), allocatable :: text
+      character(len=32) :: digits
+      write (digits, format) x
       text = trim(adjustl(digits))
       if (text(1:1) == '.') text = '0'//text ! which some compilers leave out
-   end function short_text
+   end function formatted
 
 end module rodyn_text

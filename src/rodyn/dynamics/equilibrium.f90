@@ -7,6 +7,7 @@
 !> the equilibrium (stops, freeplay).
 module rodyn_equilibrium
    use rodyn_kinds, only: wp
+   use rodyn_text, only: formatted
    use rodyn_errors, only: error_type, raise
    use rodyn_lapack, only: dgetrf, dgetrs
    use rodyn_locks, only: expand, expansion_matrix, free_coordinates, has_slaves
@@ -170,15 +171,14 @@ contains
       real(wp), intent(in) :: largest !! of the derivatives of the accelerations: their rounding errors
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: rate(size(y))
-      character(len=12) :: digits
       logical :: ok
 
       call motion%rhs(t, y, rate, ok)
       associate (spin_rate => rate(motion%n_q + 3))
          if (ok .and. abs(spin_rate) <= 1.0e3_wp*epsilon(1.0_wp)*max(1.0_wp, largest)) return
-         write (digits, '(es10.3)') spin_rate
+         call raise(error, "no equilibrium: the loads turn the spacecraft ever faster, omega' = "// &
+                    formatted(spin_rate, '(es10.3)')//' rad/s^2')
       end associate
-      call raise(error, "no equilibrium: the loads turn the spacecraft ever faster, omega' = "//trim(adjustl(digits))//' rad/s^2')
    end subroutine check_spin
 
 end module rodyn_equilibrium

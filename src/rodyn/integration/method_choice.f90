@@ -8,6 +8,7 @@
 !> methods are tried on the beginning of the run.
 module rodyn_method_choice
    use rodyn_kinds, only: wp
+   use rodyn_text, only: to_text, formatted
    use rodyn_case_config, only: none_given, solver_config
    use rodyn_scene, only: scene_type
    use rodyn_fastest_rates, only: fastest_rates, with_rigid_rods
@@ -137,12 +138,10 @@ contains
    function short(value) result(text)
       real(wp), intent(in) :: value
       character(len=:), allocatable :: text
-      character(len=16) :: digits
       if (value >= 1.0e-3_wp .and. value < 1.0e6_wp) then
          text = time_text(real(nint(value*10.0_wp**(2 - floor(log10(value)))), wp)*10.0_wp**(floor(log10(value)) - 2))
       else
-         write (digits, '(es8.2)') value
-         text = trim(adjustl(digits))
+         text = formatted(value, '(es8.2)')
       end if
    end function short
 
@@ -150,13 +149,11 @@ contains
    function whole(value) result(text)
       real(wp), intent(in) :: value
       character(len=:), allocatable :: text
-      character(len=16) :: digits
       if (value < 1.0e9_wp) then
-         write (digits, '(i0)') max(1, nint(value))
+         text = to_text(max(1, nint(value)))
       else
-         write (digits, '(es8.1)') value
+         text = formatted(value, '(es8.1)')
       end if
-      text = trim(adjustl(digits))
    end function whole
 
 end module rodyn_method_choice

@@ -3,6 +3,7 @@ module rodyn_progress
    use, intrinsic :: iso_fortran_env, only: error_unit
    use, intrinsic :: iso_c_binding, only: c_int
    use rodyn_kinds, only: wp, i8
+   use rodyn_text, only: formatted
    use rodyn_posix_files, only: stop_signal
    use rodyn_integrator, only: monitor_type, time_text
    implicit none (type, external)
@@ -113,7 +114,7 @@ contains
       done = 1.0_wp
       if (t_end > t_start) done = min(1.0_wp, max(0.0_wp, (t - t_start)/(t_end - t_start)))
       write (steps, '(i0)') n_steps
-      line = 't = '//significant(t)//' of '//time_text(t_end)//' s, '//one_decimal(100.0_wp*done)//' %, ' &
+      line = 't = '//formatted(t, '(g16.6)')//' of '//time_text(t_end)//' s, '//formatted(100.0_wp*done, '(f8.1)')//' %, ' &
          //trim(steps)//' steps, '
       if (done > 0.0_wp) then
          line = line//duration_text(elapsed*(1.0_wp - done)/done)//' left'
@@ -121,24 +122,6 @@ contains
          line = line//'time left unknown'
       end if
    end function progress_line
-
-   pure function one_decimal(x) result(text)
-      real(wp), intent(in) :: x !! 0 to 100
-      character(len=:), allocatable :: text
-      character(len=8) :: digits
-      write (digits, '(f8.1)') x
-      text = trim(adjustl(digits))
-   end function one_decimal
-
-   !> Six significant digits, with their zeros, so that the line does not dance.
-   pure function significant(x) result(text)
-      real(wp), intent(in) :: x
-      character(len=:), allocatable :: text
-      character(len=24) :: digits
-      write (digits, '(g16.6)') x
-      text = trim(adjustl(digits))
-      if (text(1:1) == '.') text = '0'//text
-   end function significant
 
    !> `h:mm:ss`, with the days in front from one day on: `2 d 03:04:05`. Rounded to seconds.
    pure function duration_text(seconds) result(text)

@@ -37,6 +37,7 @@ contains
       if (allocated(error) .or. .not. allocated(r%coefficient)) return
       call fast_eigenvalues(scene, y, t_end, lambda)
       step = longest_step(scene, options%fixed_step, t_end)
+      allocate (growth(size(lambda, 2)))
       growth = growth_in_run(r, lambda, step, t_end)
       if (all(growth <= log(most_growth))) return
       associate (limit => largest_stable_step(r, lambda, step, t_end), fastest => lambda(1, maxloc(growth, dim=1)))

@@ -2,6 +2,7 @@
 module rodyn_run
    use, intrinsic :: iso_fortran_env, only: output_unit
    use rodyn_kinds, only: wp, i8
+   use rodyn_text, only: formatted
    use rodyn_errors, only: error_type, raise, exit_stopped
    use rodyn_case_config, only: case_config
    use rodyn_case_reader, only: resolved_case
@@ -241,14 +242,12 @@ contains
    subroutine print_events(motion)
       type(motion_type), intent(in) :: motion
       integer, parameter :: most_lines = 20
-      character(len=16) :: lost
       integer :: i
 
       do i = 1, min(most_lines, motion%events%n_logged)
          associate (event => motion%events%log(i))
-            write (lost, '(es10.3)') event%energy_lost
             write (output_unit, '(a, i0, a)') 'event   t = '//time_text(event%time)//' s: hinge ', event%hinge, ' '// &
-               trim(kind_names(event%kind))//', '//trim(adjustl(lost))//' J lost'
+               trim(kind_names(event%kind))//', '//formatted(event%energy_lost, '(es10.3)')//' J lost'
          end associate
       end do
       if (motion%events%n_logged > most_lines) write (output_unit, '(a, i0, a)') 'event   and ', &
@@ -279,14 +278,12 @@ contains
       type(error_type), allocatable, intent(in) :: failure !! why the run ended early
       type(solver_statistics) :: stats
       character(len=8) :: outcome
-      character(len=24) :: duration
 
       stats = integrator%statistics()
       outcome = 'done'
       if (allocated(failure)) outcome = merge('stopped', 'failed ', failure%exit_code == exit_stopped)
-      write (duration, '(f20.3)') seconds
       write (output_unit, '(a, i0, a, i0, a)') outcome//'t = '//time_text(t)//' s, ', stats%n_steps, ' steps, ', &
-         stats%n_rhs, ' right-hand sides, '//trim(adjustl(duration))//' s'
+         stats%n_rhs, ' right-hand sides, '//formatted(seconds, '(f20.3)')//' s'
       if (config%output%ledger) write (output_unit, '(a, es8.1, a, es8.1, a)') 'ledger  largest energy residual ', &
          recorder%worst_residual, ' J of ', recorder%energy_scale, ' J'
       call print_lines('warning', recorder%validity%warnings())

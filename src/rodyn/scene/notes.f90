@@ -4,7 +4,7 @@ module rodyn_notes
    use rodyn_errors, only: error_type
    use rodyn_scene, only: scene_type
    use rodyn_frequencies, only: natural_frequencies
-   use rodyn_text, only: to_text
+   use rodyn_text, only: to_text, formatted
    implicit none (type, external)
    private
    public :: notes_on, neglected_damping
@@ -21,7 +21,6 @@ contains
       real(wp), intent(in) :: q(:)    !! coordinates at the start (dof)
       logical, intent(in) :: ledger   !! energies are recorded
       character(len=:), allocatable :: text
-      character(len=8) :: digits
       real(wp) :: term, frequency
       integer :: hinge
 
@@ -36,11 +35,8 @@ contains
                 to_text(hinge)//', which has a damper but no spring'//remedy
          return
       end if
-      write (digits, '(es8.1)') term
-      text = text//'quasistatic bending neglects terms (D w/C)^2 of the dampers: up to '//trim(adjustl(digits))// &
-             ' (hinge '//to_text(hinge)
-      write (digits, '(es8.2)') frequency
-      text = text//', w = '//trim(adjustl(digits))//' rad/s)'//remedy
+      text = text//'quasistatic bending neglects terms (D w/C)^2 of the dampers: up to '//formatted(term, '(es8.1)')// &
+             ' (hinge '//to_text(hinge)//', w = '//formatted(frequency, '(es8.2)')//' rad/s)'//remedy
    end function notes_on
 
    !> Largest (D w/C)^2 of the hinges, w the highest natural frequency, docs/model.md sec. 5: the relative size of what

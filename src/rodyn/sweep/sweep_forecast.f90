@@ -10,7 +10,7 @@ module rodyn_sweep_forecast
    use rodyn_sweep_plan, only: sweep_plan
    use rodyn_sweep_record, only: record_words
    use rodyn_sweep_worker, only: case_feed, lanes_text, run_cases, uses_lanes
-   use rodyn_text, only: to_text
+   use rodyn_text, only: to_text, formatted
    implicit none (type, external)
    private
    public :: print_forecast
@@ -128,7 +128,7 @@ contains
          write (output_unit, '(a)') 'lanes   '//lanes_text(sweep, plan)
          write (output_unit, '(a)') 'time    about '//duration_text(mean*n_computed)//' on one core'// &
             trim(merge(' or more', '        ', cut))//', by '//to_text(feed%n_kept)//' cases of '// &
-            short_number(1000.0_wp*mean)//' ms on average'// &
+            formatted(1000.0_wp*mean, '(f12.3)')//' ms on average'// &
             trim(merge(' (some were cut short or failed)', '                                ', cut))
       end associate
    end subroutine print_time
@@ -140,17 +140,9 @@ contains
       integer, intent(in) :: n_computed
       real(wp) :: record
       record = 8.0_wp*record_words(shape, status_done, 0)
-      write (output_unit, '(a)') 'disk    about '//short_number(1.0e-6_wp*record*n_computed)//' MB of shards and '// &
-         short_number(1.0e-6_wp*record*plan%n_cases)//' MB of sweep.h5'
+      write (output_unit, '(a)') 'disk    about '//formatted(1.0e-6_wp*record*n_computed, '(f12.3)')//' MB of shards and '// &
+         formatted(1.0e-6_wp*record*plan%n_cases, '(f12.3)')//' MB of sweep.h5'
    end subroutine print_disk
-
-   pure function short_number(x) result(text)
-      real(wp), intent(in) :: x
-      character(len=:), allocatable :: text
-      character(len=16) :: digits
-      write (digits, '(f12.3)') x
-      text = trim(adjustl(digits))
-   end function short_number
 
    subroutine beat(self, stop_now)
       class(sample_feed), intent(inout) :: self

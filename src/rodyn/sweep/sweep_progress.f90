@@ -5,7 +5,7 @@ module rodyn_sweep_progress
    use rodyn_posix, only: host_name, process_id, utc_now
    use rodyn_posix_files, only: write_text_file
    use rodyn_progress, only: duration_text, is_terminal
-   use rodyn_text, only: to_text
+   use rodyn_text, only: to_text, formatted
    implicit none (type, external)
    private
    public :: sweep_progress, sweep_counts, sweep_line
@@ -98,12 +98,11 @@ contains
       type(sweep_counts), intent(in) :: counts
       real(wp), intent(in) :: elapsed !! since the start of this run [s]
       character(len=:), allocatable :: line
-      character(len=8) :: percent
       integer :: ended
 
       ended = counts%done + counts%failed
-      write (percent, '(f8.1)') 100.0_wp*real(ended, wp)/real(max(1, counts%total), wp)
-      line = to_text(ended)//' of '//to_text(counts%total)//' cases, '//trim(adjustl(percent))//' %, '// &
+      line = to_text(ended)//' of '//to_text(counts%total)//' cases, '// &
+             formatted(100.0_wp*real(ended, wp)/real(max(1, counts%total), wp), '(f8.1)')//' %, '// &
              to_text(counts%failed)//' failed, '//left(counts, elapsed)//' left'
    end function sweep_line
 
