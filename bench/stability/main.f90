@@ -1,6 +1,6 @@
 !> Measurements for bench/stability/run.py, one table each, columns apart by tabs:
 !>
-!>     bench_stability limits | orders | tolerances | configurations | samples | extremes | drift SCENE PERIODS METHOD...
+!>     bench_stability limits | orders | tableaux | tolerances | configurations | samples | extremes | drift SCENE PERIODS METHOD...
 program bench_stability
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
@@ -8,6 +8,7 @@ program bench_stability
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_frequencies, only: decay_rates, natural_frequencies
    use rodyn_accelerations, only: dynamics_type, new_dynamics
+   use rodyn_erk_integrator, only: erk_tableau
    use rodyn_stability_function, only: stability_function, stability_function_of
    use rodyn_step_limit, only: largest_stable_step
    use rodyn_bench_campaign_runs, only: run_result, run_campaign_case, article_chain, empty_case
@@ -24,13 +25,14 @@ program bench_stability
    select case (command)
    case ('limits'); call limits()
    case ('orders'); call observed_orders()
+   case ('tableaux'); call tableaux()
    case ('tolerances'); call tolerances()
    case ('configurations'); call configurations()
    case ('samples'); call samples()
    case ('extremes'); call extremes()
    case ('drift'); call drift()
    case default
-      error stop 'bench_stability limits | orders | tolerances | configurations | samples | extremes | drift ...'
+      error stop 'bench_stability limits | orders | tableaux | tolerances | configurations | samples | extremes | drift ...'
    end select
 
 contains
@@ -94,6 +96,20 @@ contains
          y(m + base + n + 1:) = [initial%alpha_rate, initial%beta_rate]
       end associate
    end subroutine state_at_start
+
+   !> The tables of `erk` of order 6 and more, for `quad_orders`: order and stages, then b and the columns of a.
+   subroutine tableaux()
+      real(wp), allocatable :: a(:, :), b(:), c(:)
+      type(error_type), allocatable :: error
+      integer :: order
+
+      do order = 6, 8
+         call erk_tableau(order, a, b, c, error)
+         if (allocated(error)) error stop 'no table'
+         write (*, '(i0, 1x, i0)') order, size(b)
+         write (*, '(es24.16)') b, a
+      end do
+   end subroutine tableaux
 
    !> Errors of six fixed steps, the slope of a straight line through their logarithms, and the slope that the method's stability
    !> function foretells: over five halvings, or as many as there are between the steps at which further terms of the expansion

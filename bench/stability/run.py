@@ -55,30 +55,31 @@ def measure(part: str) -> None:
     else:
         text = output_of([example(), part])
     if part == "orders":
-        (RESULTS / "orders_quad.txt").write_text(output_of([quad_orders()]))
+        (RESULTS / "orders_quad.txt").write_text(output_of([quad_orders()], output_of([example(), "tableaux"])))
     (RESULTS / f"{part}.txt").write_text(text)
 
 
-#: What `gauss` consists of, in the order of compilation; before it `kinds.f90` with another precision.
-GAUSS = ["base/lanes", "base/errors", "base/lapack", "scene/quadrature", "dynamics/trigonometry", "integration/dense_newton",
-         "integration/ode", "integration/integrator", "integration/lane_algebra", "integration/gauss_collocation",
-         "integration/gauss_integrator"]
+#: What `gauss` and `dop853` consist of, in the order of compilation; before it `kinds.f90` with another precision.
+INTEGRATORS = ["base/lanes", "base/errors", "base/lapack", "scene/quadrature", "dynamics/trigonometry", "integration/dense_newton",
+               "integration/ode", "integration/integrator", "integration/event_search", "integration/dop853_tableau",
+               "integration/dop853_integrator", "integration/lane_algebra", "integration/gauss_collocation",
+               "integration/gauss_integrator"]
 
 
 def quad_orders() -> str:
-    """Path of the program that measures the order of `gauss` in quadruple precision."""
-    place, sources = RESULTS / "quad", ROOT / "src" / "rodyn"
+    """Path of the program that measures orders in quadruple precision."""
+    place, sources, here = RESULTS / "quad", ROOT / "src" / "rodyn", ROOT / "bench/stability/quad_orders"
     place.mkdir(parents=True, exist_ok=True)
     (place / "kinds.f90").write_text((sources / "base" / "kinds.f90").read_text().replace("real64", "real128"))
     program = place / "quad_orders"
     subprocess.run([os.environ.get("FPM_FC", "mpifort"), "-O2", "-fimplicit-none", f"-J{place}", "-o", program, place / "kinds.f90",
-                    *(sources / f"{name}.f90" for name in GAUSS), ROOT / "bench/stability/quad_orders/main.f90", "-llapack", "-lblas"],
-                   check=True)
+                    *(sources / f"{name}.f90" for name in INTEGRATORS),
+                    *(here / f"{name}.f90" for name in ("problems", "table_steps", "main")), "-llapack", "-lblas"], check=True)
     return str(program)
 
 
-def output_of(command: list[str]) -> str:
-    return subprocess.run(["nice", *command], capture_output=True, text=True, check=True).stdout
+def output_of(command: list[str], given: str | None = None) -> str:
+    return subprocess.run(["nice", *command], input=given, capture_output=True, text=True, check=True).stdout
 
 
 def article_runs() -> str:
@@ -138,16 +139,19 @@ def limits_table() -> str:
 
 
 def orders_table() -> str:
-    return table(["method", "halvings", "slope", "foretold", "first h ω", "errors of six steps"],
-                 [[named(*row[:2]), f"{float(row[2]):g}", f"{float(row[3]):.2f}", f"{float(row[4]):.2f}", f"{float(row[5]):.2f}",
-                   ", ".join(map(short, row[6:]))] for row in rows("orders")] + [quad_row()])
+    body = [[named(*row[:2]), "rod", f"{float(row[2]):g}", f"{float(row[3]):.2f}", f"{float(row[4]):.2f}", f"{float(row[5]):.2f}",
+             ", ".join(map(short, row[6:]))] for row in rows("orders")]
+    return table(["method", "motion", "halvings", "slope", "foretold", "first h ω", "errors"], body + quad_rows())
 
 
-def quad_row() -> list[str]:
-    """`gauss` on Kepler's problem in quadruple precision; the first of its steps is 1."""
-    errors = [float(text) for text in rows("orders_quad")[0][1:]]
-    slope = -np.polyfit(np.arange(len(errors)), np.log2(errors), 1)[0]
-    return ["`gauss` 16, real128", str(len(errors) - 1), f"{slope:.2f}", "–", "1.00", ", ".join(short(str(e)) for e in errors)]
+def quad_rows() -> list[list[str]]:
+    """In quadruple precision; of the ellipse the first step is h omega, omega being 1, the polynomials have no frequency."""
+    body = []
+    for method, order, problem, step, *errors in rows("orders_quad"):
+        slope = -np.polyfit(np.arange(len(errors)), np.log2([float(e) for e in errors]), 1)[0]
+        body.append([f"{named(method, order)}, real128", problem, str(len(errors) - 1), f"{slope:.2f}", "–",
+                     f"{float(step):.2f}" if problem == "ellipse" else "–", ", ".join(map(short, errors))])
+    return body
 
 
 def tolerances_table() -> str:

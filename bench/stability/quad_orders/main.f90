@@ -1,154 +1,100 @@
-!> Order of `gauss` where rounding does not end the measurement: the sources of the integrator, compiled with wp = real128, on
-!> Kepler's problem, whose solution is known. `bench/stability/run.py orders` builds and runs it.
+!> Orders of the methods of order 6 and more where rounding does not end the measurement: the sources of `gauss` and `dop853`
+!> compiled with wp = real128, and the tables of `erk`, on problems whose solutions are known.
+!> `bench/stability/run.py orders` builds and runs it, with the tables that `bench_stability tableaux` prints on its input.
 !>
-!> Printed: the errors of (q, p) at the end of five runs, each with twice the steps.
-module kepler_problem
-   use rodyn_kinds, only: wp
-   use rodyn_lanes, only: lanes
-   use rodyn_ode, only: mechanical_system, stiff_modes
-   implicit none (type, external)
-   private
-   public :: kepler, exact_state
-
-   !> q'' = -q/|q|^3 in the plane: an ellipse of half axis 1, mean motion 1 rad/s.
-   type, extends(mechanical_system) :: kepler
-   contains
-      procedure :: rhs
-      procedure :: jacobian
-      procedure :: has_lanes
-      procedure :: lane_accelerations
-      procedure :: find_modes
-      procedure :: quadratures
-   end type kepler
-
-contains
-
-   !> (q, p) at time t after the pericentre, from Kepler's equation E - e sin E = t.
-   function exact_state(eccentricity, t) result(y)
-      real(wp), intent(in) :: eccentricity, t
-      real(wp) :: y(4), anomaly, rate
-      integer :: i
-
-      anomaly = t
-      do i = 1, 60
-         anomaly = anomaly - (anomaly - eccentricity*sin(anomaly) - t)/(1.0_wp - eccentricity*cos(anomaly))
-      end do
-      rate = 1.0_wp/(1.0_wp - eccentricity*cos(anomaly))
-      associate (b => sqrt(1.0_wp - eccentricity**2))
-         y = [cos(anomaly) - eccentricity, b*sin(anomaly), -rate*sin(anomaly), rate*b*cos(anomaly)]
-      end associate
-   end function exact_state
-
-   subroutine rhs(self, t, y, ydot, ok)
-      class(kepler), intent(inout) :: self
-      real(wp), intent(in) :: t
-      real(wp), contiguous, intent(in) :: y(:)
-      real(wp), contiguous, intent(out) :: ydot(:)
-      logical, intent(out) :: ok
-      associate (unused => self, unused_t => t); end associate
-      ydot = [y(3:4), -y(1:2)/(y(1)**2 + y(2)**2)**1.5_wp]
-      ok = .true.
-   end subroutine rhs
-
-   !> Not needed.
-   subroutine jacobian(self, t, y, jac, ok)
-      class(kepler), intent(inout) :: self
-      real(wp), intent(in) :: t
-      real(wp), contiguous, intent(in) :: y(:)
-      real(wp), contiguous, intent(out) :: jac(:, :)
-      logical, intent(out) :: ok
-      associate (unused => self, unused_t => t, unused_y => y); end associate
-      jac = 0.0_wp
-      ok = .false.
-   end subroutine jacobian
-
-   logical function has_lanes(self)
-      class(kepler), intent(in) :: self
-      associate (unused => self); end associate
-      has_lanes = .true.
-   end function has_lanes
-
-   subroutine lane_accelerations(self, t, q, p, acceleration, ok)
-      class(kepler), intent(inout) :: self
-      real(wp), intent(in) :: t(lanes)
-      real(wp), contiguous, intent(in) :: q(:, :), p(:, :)
-      real(wp), contiguous, intent(out) :: acceleration(:, :)
-      logical, intent(out) :: ok
-      real(wp) :: cubed(lanes)
-      associate (unused => self, unused_t => t, unused_p => p); end associate
-      cubed = (q(:, 1)**2 + q(:, 2)**2)**1.5_wp
-      acceleration(:, 1) = -q(:, 1)/cubed
-      acceleration(:, 2) = -q(:, 2)/cubed
-      ok = .true.
-   end subroutine lane_accelerations
-
-   !> Nothing is stiff: the fixed-point iteration is the method's own.
-   subroutine find_modes(self, q, slowest, modes, ok)
-      class(kepler), intent(inout) :: self
-      real(wp), intent(in) :: q(:)
-      real(wp), intent(in) :: slowest
-      type(stiff_modes), intent(inout) :: modes
-      logical, intent(out) :: ok
-      associate (unused => self, unused_q => q, unused_slowest => slowest); end associate
-      modes%n = 0
-      if (.not. allocated(modes%omega_2)) allocate (modes%omega_2(0), modes%damping(0), modes%u(0, 2), modes%v(2, 0))
-      ok = .true.
-   end subroutine find_modes
-
-   subroutine quadratures(self, t, q, p, rate)
-      class(kepler), intent(inout) :: self
-      real(wp), intent(in) :: t
-      real(wp), contiguous, intent(in) :: q(:), p(:)
-      real(wp), intent(out) :: rate(:)
-      associate (unused => self, unused_t => t, unused_q => q, unused_p => p); end associate
-      rate = 0.0_wp
-   end subroutine quadratures
-
-end module kepler_problem
-
+!> Printed, columns apart by tabs: method, order, problem, first step, and the errors of (q, p) at the end of runs, each with
+!> twice the steps of the one before.
 program quad_orders
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
-   use rodyn_integrator, only: solver_options
+   use rodyn_integrator, only: integrator_type, solver_options
+   use rodyn_dop853_integrator, only: dop853_integrator, new_dop853_integrator
    use rodyn_gauss_integrator, only: gauss_integrator, new_gauss_integrator
-   use kepler_problem, only: kepler, exact_state
+   use smooth_problems, only: smooth_problem, kepler, polynomial_chain
+   use table_steps, only: table_type, read_table, steps_by_table
    implicit none (type, external)
-   real(wp), parameter :: eccentricity = 0.1_wp, t_end = 8.0_wp
-   integer, parameter :: steps(5) = [8, 16, 32, 64, 128]
-   real(wp) :: errors(size(steps))
-   integer :: i
+   character(len=1), parameter :: tab = achar(9)
+   type(kepler), target :: orbit
+   type(polynomial_chain), target :: chain
+   type(table_type) :: table
 
    if (precision(1.0_wp) < 30) error stop 'compile with wp = real128'
-   do i = 1, size(steps)
-      errors(i) = error_of(steps(i))
+   call set_size(orbit, 2)
+   call set_size(chain, 3)
+   do while (read_table(table))
+      call measure('erk', table%order, 'ellipse', orbit, 8.0_wp, 128, 5)
    end do
-   write (*, '(a, *(a, es12.5))') 'gauss', (achar(9), errors(i), i=1, size(steps))
+   call measure('dop853', 8, 'ellipse', orbit, 8.0_wp, 64, 5)
+   call measure('gauss', 16, 'ellipse', orbit, 8.0_wp, 8, 4) ! then rounding is seen
+   call measure('gauss', 16, 'polynomials', chain, 2.0_wp, 1, 5)
 
 contains
 
-   !> Error of (q, p) at the end of so many equal steps.
-   real(wp) function error_of(n_steps)
+   subroutine set_size(system, n)
+      class(smooth_problem), intent(inout) :: system
+      integer, intent(in) :: n
+      system%n_dof = n
+      system%n_states = 2*n
+      system%n_controlled = 2*n
+   end subroutine set_size
+
+   subroutine measure(method, order, problem, system, t_end, fewest, halvings)
+      character(len=*), intent(in) :: method, problem
+      integer, intent(in) :: order
+      class(smooth_problem), target, intent(inout) :: system
+      real(wp), intent(in) :: t_end
+      integer, intent(in) :: fewest !! steps of the first run
+      integer, intent(in) :: halvings
+      real(wp) :: error(0:halvings)
+      integer :: i
+
+      do i = 0, halvings
+         error(i) = norm2(last_state(method, system, t_end, fewest*2**i) - system%exact(t_end))
+      end do
+      write (*, '(a, a, i0, 2a, a, f6.4, *(a, es12.5))') method, tab, order, tab, problem, tab, t_end/fewest, &
+         (tab, error(i), i=0, halvings)
+   end subroutine measure
+
+   !> After so many equal steps.
+   function last_state(method, system, t_end, n_steps) result(y)
+      character(len=*), intent(in) :: method
+      class(smooth_problem), target, intent(inout) :: system
+      real(wp), intent(in) :: t_end
       integer, intent(in) :: n_steps
-      type(kepler), target :: system
-      type(gauss_integrator) :: gauss
+      type(gauss_integrator), target :: gauss
+      type(dop853_integrator), target :: dop853
       type(solver_options) :: options
       type(error_type), allocatable :: error
-      real(wp) :: y(4), t
+      real(wp) :: y(system%n_states)
 
-      system%n_states = 4
-      system%n_controlled = 4
-      system%n_dof = 2
       options%fixed_step = t_end/n_steps
-      ! What the iteration may leave: far less than the error of the method, but no more digits than 15 iterations bring.
+      ! What the iteration of gauss may leave: far less than the error of the method, but no more digits than 15 iterations bring.
       options%rtol = max(1.0e-33_wp, 1.0e-18_wp*options%fixed_step**16)
       options%atol = 0.01_wp*options%rtol
-      call new_gauss_integrator(gauss, system, options, error)
-      if (.not. allocated(error)) call gauss%set_stop(t_end)
-      if (.not. allocated(error)) call gauss%start(0.0_wp, exact_state(eccentricity, 0.0_wp), error)
-      if (.not. allocated(error)) call gauss%advance(t_end, y, t, error)
+      select case (method)
+      case ('gauss')
+         call new_gauss_integrator(gauss, system, options, error)
+         if (.not. allocated(error)) call run(gauss, system%exact(0.0_wp), t_end, y, error)
+      case ('dop853')
+         call new_dop853_integrator(dop853, system, options, error)
+         if (.not. allocated(error)) call run(dop853, system%exact(0.0_wp), t_end, y, error)
+      case default
+         y = steps_by_table(table, system, system%exact(0.0_wp), options%fixed_step, n_steps)
+      end select
       if (allocated(error)) error stop 'no solution'
-      error_of = norm2(y - exact_state(eccentricity, t_end))
-   end function error_of
+   end function last_state
+
+   subroutine run(integrator, y0, t_end, y, error)
+      class(integrator_type), intent(inout) :: integrator
+      real(wp), intent(in) :: y0(:), t_end
+      real(wp), intent(out) :: y(:)
+      type(error_type), allocatable, intent(inout) :: error
+      real(wp) :: t
+
+      call integrator%set_stop(t_end)
+      call integrator%start(0.0_wp, y0, error)
+      if (.not. allocated(error)) call integrator%advance(t_end, y, t, error)
+   end subroutine run
 
 end program quad_orders
 
