@@ -9,6 +9,11 @@
 !> Written as Schur complements (pnn - Cn^2/D, ...) the new P loses as many digits as the outboard mass exceeds
 !> the rod's. Here the products are multiplied out, so that the large terms cancel on paper; the determinant of
 !> P, which does not depend on the axes, is carried along for the one difference (pee pnn - pen^2) that is left.
+!>
+!> What takes time is the chain of operations that must wait for each other, from rod to rod. So as much as can be is done
+!> beside it: b, and outward A, go from one node and its axes to the next in one step,
+!>     b' = T^T b + ...,  A_outer = T A_inner + ...,  T = ((cos, sin), (down, kept)),
+!> with the angle from rod to rod in cos and sin, and W' eliminated in down and kept.
 module rodyn_recursion_flexible
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp
@@ -36,14 +41,14 @@ contains
       real(wp), intent(in) :: base_force(3)         !! X_C, Y_C, M_C, moving axes
       logical, intent(in) :: loaded                 !! node_force is to be used
       real(wp), intent(in) :: node_force(2, *)      !! X, Y at nodes (n), moving axes [N]
-      real(wp), intent(out) :: outward(8, n)        !! workspace
+      real(wp), intent(out) :: outward(10, n)       !! workspace
       real(wp), intent(out) :: acceleration(n_base + 3*n) !! p'
       logical, intent(out) :: ok                    !! false: not finite, or M not positive definite (large deflections in `paper`)
 
       integer :: k, ip, ia, ib
       real(wp) :: omega, omega_rate, w, w2, lw2, w_rate, alpha, beta, qa, qb
-      real(wp) :: mv, mv_rate, mvv, mvv_rate, d, arm, outer, central, r0, gq, hq
-      real(wp) :: pee, pen, pnn, det, be, bn, mu, inv, ce, cn, r, ee, en, nn, cd, sd, ae, an, smallest, base_smallest, &
+      real(wp) :: mv, mv_rate, mvv, mvv_rate, d, arm, outer, central, r0, gq, hq, lever, down, kept
+      real(wp) :: pee, pen, pnn, det, trace, be, bn, mu, inv, ce, cn, r, ee, en, nn, cd, sd, ae, an, smallest, base_smallest, &
                   moment_in, moment_out, opening, opening_rate
 
       ip = n_base
@@ -55,6 +60,7 @@ contains
       pen = 0.0_wp
       pnn = 0.0_wp
       det = 0.0_wp
+      trace = 0.0_wp
       be = 0.0_wp
       bn = 0.0_wp
       smallest = huge(1.0_wp)
@@ -64,7 +70,7 @@ contains
          associate (rod => rods(rod_of(k)), i => rods(rod_of(k))%inertia)
             ! The node at the outer end: P and b in the axes of rod k.
             mu = node_mass(k)
-            det = det + mu*(pee + pnn + mu)
+            det = det + mu*(trace + mu)
             pee = pee + mu
             pnn = pnn + mu
             if (loaded) then
@@ -108,7 +114,9 @@ contains
 
             moment_out = moment_in
 
-            ! Row of W'.
+            ! Row of W', and what follows from it for the outer node.
+            cd = cosine(k)*cosine(k - 1) + sine(k)*sine(k - 1)
+            sd = sine(k)*cosine(k - 1) - cosine(k)*sine(k - 1)
             d = rod%m2_reduced + mvv
             arm = d - rod%length_m1
             outer = rod%outer + mvv
@@ -118,17 +126,26 @@ contains
             inv = 1.0_wp/inv
             ce = rod%length*pen - mv
             cn = rod%m1_reduced + rod%length*pnn
+            lever = rod%length*ce
+            down = -(arm*sd + lever*cd)*inv
+            kept = (arm*cd - lever*sd)*inv
+            r0 = r0*inv
             be = be - pee*lw2
             bn = bn - pen*lw2
-            r = (r0 - rod%length*bn)*inv
-            outward(1, k) = r
+            outward(1, k) = r0 - (rod%length*inv)*bn
             outward(2, k) = ce*inv
             outward(3, k) = cn*inv
             outward(6, k) = lw2
+            outward(7, k) = cd
+            outward(8, k) = sd
+            outward(9, k) = down
+            outward(10, k) = kept
 
-            ! The chain seen from the inner node, in the axes of rod k.
-            be = be - w2*i%m1 - w*mv_rate + ce*r
-            bn = (bn*arm + cn*r0)*inv + gq
+            ! The chain seen from the inner node: P in the axes of rod k, b already in those of rod k - 1.
+            be = be - (w2*i%m1 + w*mv_rate)
+            r = (cd*be - sd*gq) + (cd*ce - sd*cn)*r0 + down*bn
+            bn = (sd*be + cd*gq) + (sd*ce + cd*cn)*r0 + kept*bn
+            be = r
             nn = central + pnn*outer
             ee = pee*d + rod%length_2*det + mv*(2.0_wp*rod%length*pen - mv)
             en = pen*arm + mv*cn
@@ -139,17 +156,11 @@ contains
             nn = nn*inv
          end associate
 
-         ! Turn to the axes of rod k - 1 (of the spacecraft for k = 1).
-         cd = cosine(k)*cosine(k - 1) + sine(k)*sine(k - 1)
-         sd = sine(k)*cosine(k - 1) - cosine(k)*sine(k - 1)
-         outward(7, k) = cd
-         outward(8, k) = sd
+         ! P in the axes of rod k - 1 (of the spacecraft for k = 1).
+         trace = ee + nn
          pee = cd*cd*ee + sd*(sd*nn - 2.0_wp*cd*en)
          pnn = cd*cd*nn + sd*(sd*ee + 2.0_wp*cd*en)
          pen = cd*sd*(ee - nn) + (cd - sd)*(cd + sd)*en
-         r = cd*be - sd*bn
-         bn = sd*be + cd*bn
-         be = r
       end do inward
 
       call spacecraft_accelerations(n_base, body, p, node_mass(0), pee, pen, pnn, det, be, bn, moment_out, &
@@ -159,17 +170,14 @@ contains
 
       do k = 1, n
          associate (g => rods(rod_of(k))%g, h => rods(rod_of(k))%h, length => rods(rod_of(k))%length)
-            cd = outward(7, k)
-            sd = outward(8, k)
-            r = cd*ae + sd*an
-            an = cd*an - sd*ae
-            ae = r
-            w_rate = outward(1, k) - outward(2, k)*ae - outward(3, k)*an
+            ee = outward(7, k)*ae + outward(8, k)*an
+            nn = outward(7, k)*an - outward(8, k)*ae
+            w_rate = outward(1, k) - outward(2, k)*ee - outward(3, k)*nn
             acceleration(ip + k) = w_rate - omega_rate
-            acceleration(ia + k) = outward(4, k) - g(1)*an - h(1)*w_rate
-            acceleration(ib + k) = outward(5, k) - g(2)*an - h(2)*w_rate
-            ae = ae - outward(6, k)
-            an = an + length*w_rate
+            acceleration(ia + k) = outward(4, k) - g(1)*nn - h(1)*w_rate
+            acceleration(ib + k) = outward(5, k) - g(2)*nn - h(2)*w_rate
+            an = outward(9, k)*ae + (outward(10, k)*an + length*outward(1, k))
+            ae = ee - outward(6, k)
          end associate
       end do
       ok = ieee_is_finite(an) .and. smallest > 0.0_wp .and. base_smallest > 0.0_wp

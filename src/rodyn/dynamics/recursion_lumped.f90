@@ -29,7 +29,7 @@ contains
       real(wp), intent(in) :: base_force(3)         !! X_C, Y_C, M_C, moving axes
       logical, intent(in) :: loaded                 !! node_force is to be used
       real(wp), intent(in) :: node_force(2, *)      !! X, Y at nodes (n), moving axes [N]
-      real(wp), intent(out) :: outward(8, n)        !! workspace
+      real(wp), intent(out) :: outward(10, n)       !! workspace
       real(wp), intent(out) :: acceleration(n_base + n) !! p'
       logical, intent(out) :: ok                    !! false: not finite
 

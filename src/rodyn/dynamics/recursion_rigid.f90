@@ -27,13 +27,13 @@ contains
       real(wp), intent(in) :: base_force(3)         !! X_C, Y_C, M_C, moving axes
       logical, intent(in) :: loaded                 !! node_force is to be used
       real(wp), intent(in) :: node_force(2, *)      !! X, Y at nodes (n), moving axes [N]
-      real(wp), intent(out) :: outward(8, n)        !! workspace
+      real(wp), intent(out) :: outward(10, n)       !! workspace
       real(wp), intent(out) :: acceleration(n_base + n) !! p'
       logical, intent(out) :: ok                    !! false: not finite
 
       integer :: k
-      real(wp) :: omega, omega_rate, w2, lw2, w_rate, d, r0
-      real(wp) :: pee, pen, pnn, det, be, bn, mu, inv, cn, r, ee, en, nn, cd, sd, ae, an, base_smallest
+      real(wp) :: omega, omega_rate, w2, lw2, w_rate, arm, r0, ce, down, kept
+      real(wp) :: pee, pen, pnn, det, trace, be, bn, mu, inv, cn, r, ee, en, nn, cd, sd, ae, an, base_smallest
 
       omega = 0.0_wp
       if (n_base > 0) omega = p(3)
@@ -41,6 +41,7 @@ contains
       pen = 0.0_wp
       pnn = 0.0_wp
       det = 0.0_wp
+      trace = 0.0_wp
       be = 0.0_wp
       bn = 0.0_wp
 
@@ -48,7 +49,7 @@ contains
          associate (i => rods(rod_of(k))%inertia, length => rods(rod_of(k))%length, &
                     central => rods(rod_of(k))%central, outer => rods(rod_of(k))%outer)
             mu = node_mass(k)
-            det = det + mu*(pee + pnn + mu)
+            det = det + mu*(trace + mu)
             pee = pee + mu
             pnn = pnn + mu
             if (loaded) then
@@ -59,37 +60,41 @@ contains
             w2 = (omega + p(n_base + k))**2
             lw2 = length*w2
             r0 = moment(k) - moment(k - 1)
-            d = i%m2 - length*i%m1
+            cd = cosine(k)*cosine(k - 1) + sine(k)*sine(k - 1)
+            sd = sine(k)*cosine(k - 1) - cosine(k)*sine(k - 1)
+            arm = i%m2 - length*i%m1
             inv = 1.0_wp/(i%m2 + length**2*pnn)
+            ce = length*pen
             cn = i%m1 + length*pnn
+            r0 = r0*inv
             be = be - pee*lw2
             bn = bn - pen*lw2
-            r = (r0 - length*bn)*inv
-            outward(1, k) = r
-            outward(2, k) = length*pen*inv
+            down = -(arm*sd + length*ce*cd)*inv
+            kept = (arm*cd - length*ce*sd)*inv
+            outward(1, k) = r0 - (length*inv)*bn
+            outward(2, k) = ce*inv
             outward(3, k) = cn*inv
             outward(4, k) = lw2
+            outward(5, k) = cd
+            outward(6, k) = sd
+            outward(7, k) = down
+            outward(8, k) = kept
 
-            be = be - w2*i%m1 + length*pen*r
-            bn = (bn*d + cn*r0)*inv
+            be = be - w2*i%m1
+            r = cd*be + (cd*ce - sd*cn)*r0 + down*bn
+            bn = sd*be + (sd*ce + cd*cn)*r0 + kept*bn
+            be = r
             nn = central + pnn*outer
             ee = pee*i%m2 + length**2*det
-            en = pen*d*inv
+            en = pen*arm*inv
             det = (i%m0*nn + pee*central + det*outer)*inv
             ee = i%m0 + ee*inv
             nn = nn*inv
          end associate
-
-         cd = cosine(k)*cosine(k - 1) + sine(k)*sine(k - 1)
-         sd = sine(k)*cosine(k - 1) - cosine(k)*sine(k - 1)
-         outward(5, k) = cd
-         outward(6, k) = sd
+         trace = ee + nn
          pee = cd*cd*ee + sd*(sd*nn - 2.0_wp*cd*en)
          pnn = cd*cd*nn + sd*(sd*ee + 2.0_wp*cd*en)
          pen = cd*sd*(ee - nn) + (cd - sd)*(cd + sd)*en
-         r = cd*be - sd*bn
-         bn = sd*be + cd*bn
-         be = r
       end do inward
 
       call spacecraft_accelerations(n_base, body, p, node_mass(0), pee, pen, pnn, det, be, bn, moment(0), &
@@ -98,15 +103,14 @@ contains
       if (n_base > 0) omega_rate = acceleration(3)
 
       do k = 1, n
-         cd = outward(5, k)
-         sd = outward(6, k)
-         r = cd*ae + sd*an
-         an = cd*an - sd*ae
-         ae = r
-         w_rate = outward(1, k) - outward(2, k)*ae - outward(3, k)*an
-         acceleration(n_base + k) = w_rate - omega_rate
-         ae = ae - outward(4, k)
-         an = an + rods(rod_of(k))%length*w_rate
+         associate (length => rods(rod_of(k))%length)
+            ee = outward(5, k)*ae + outward(6, k)*an
+            nn = outward(5, k)*an - outward(6, k)*ae
+            w_rate = outward(1, k) - outward(2, k)*ee - outward(3, k)*nn
+            acceleration(n_base + k) = w_rate - omega_rate
+            an = outward(7, k)*ae + (outward(8, k)*an + length*outward(1, k))
+            ae = ee - outward(4, k)
+         end associate
       end do
       ok = ieee_is_finite(an)
    end subroutine rigid_accelerations

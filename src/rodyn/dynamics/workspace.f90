@@ -11,7 +11,7 @@ module rodyn_workspace
       real(wp), allocatable :: cosine(:)     !! cos phi_k (0:n), 1 at k = 0
       real(wp), allocatable :: theta(:)      !! joint rotations (0:n-1) [rad]
       real(wp), allocatable :: moment(:)     !! hinge moments T (0:n) [N m]
-      real(wp), allocatable :: outward(:, :) !! what the inward pass leaves for the outward pass (8, n)
+      real(wp), allocatable :: outward(:, :) !! what the inward pass leaves for the outward pass (10, n)
    end type workspace_type
 
 contains
@@ -22,7 +22,7 @@ contains
       type(scene_type), intent(in) :: scene
 
       associate (n => scene%n)
-         allocate (work%sine(0:n), work%cosine(0:n), work%theta(0:n - 1), work%moment(0:n), work%outward(8, n), &
+         allocate (work%sine(0:n), work%cosine(0:n), work%theta(0:n - 1), work%moment(0:n), work%outward(10, n), &
                    source=0.0_wp)
       end associate
       work%cosine(0) = 1.0_wp
