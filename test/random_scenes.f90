@@ -1,6 +1,6 @@
 !> Random cases of every kind, the same on every machine.
 module test_random_scenes
-   use rodyn_kinds, only: wp
+   use rodyn_kinds, only: wp, i8
    use rodyn_case_config, only: case_config, load_config
    implicit none (type, external)
    private
@@ -8,26 +8,35 @@ module test_random_scenes
 
    integer, parameter :: n_kinds = 18 !! 7 models on a free and on a fixed spacecraft, and 4 with a third bending shape
    integer, parameter :: with_two_shapes = 14
+   integer(i8), parameter :: lehmer_modulus = 2147483647_i8
 
 contains
 
    !> Start the sequence of random numbers anew.
    subroutine seed_random(seed)
       integer, intent(in) :: seed
-      integer, allocatable :: state(:)
-      integer :: i, length
-      call random_seed(size=length)
-      allocate (state(length))
-      state = [(seed + 7919*i, i=1, length)]
-      call random_seed(put=state)
+      integer(i8) :: first
+      first = draw(1_i8 + modulo(7919_i8*seed, lehmer_modulus - 1_i8))
    end subroutine seed_random
 
    !> Uniform in [low, high].
    real(wp) function uniform(low, high)
       real(wp), intent(in) :: low, high
-      call random_number(uniform)
-      uniform = low + (high - low)*uniform
+      real(wp) :: coarse, fine
+      coarse = real(draw(), wp)
+      fine = real(draw(), wp)
+      uniform = low + (high - low)*(coarse + fine/lehmer_modulus)/lehmer_modulus
    end function uniform
+
+   !> The next number of the generator of Park and Miller (Comm. ACM 31, 1988, 1192), with the multiplier of their revision: the
+   !> same with every compiler, as RANDOM_NUMBER is not.
+   integer(i8) function draw(seed)
+      integer(i8), intent(in), optional :: seed !! instead of the last number
+      integer(i8), save :: state = 1_i8
+      if (present(seed)) state = seed
+      state = modulo(48271_i8*state, lehmer_modulus)
+      draw = state
+   end function draw
 
    !> Name of a kind of scene, for messages.
    function kind_name(which) result(name)

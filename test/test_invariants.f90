@@ -101,6 +101,17 @@ contains
       end do
    end subroutine test_ledger
 
+   !> `paper` bears small deflections only. Explicit methods bear no joints between massless rods that settle within 1e-8 s: trial
+   !> steps would overflow.
+   subroutine suit_method(config)
+      type(case_config), intent(inout) :: config
+      if (config%model%bending == 'quasistatic') then
+         config%chain%hinge_damping = config%chain%hinge_damping + 0.5_wp
+      else
+         config%chain%bending_stiffness = 100.0_wp*config%chain%bending_stiffness
+      end if
+   end subroutine suit_method
+
    !> y -> -y turns all angles, Y and M round.
    subroutine test_mirror(error)
       type(error_type), allocatable, intent(out) :: error
@@ -111,7 +122,7 @@ contains
       call seed_random(12)
       do which = 1, n_kinds
          call random_case(config, which, 3)
-         config%chain%bending_stiffness = 100.0_wp*config%chain%bending_stiffness ! `paper` bears small deflections only
+         call suit_method(config)
          config%solver%rtol = 1.0e-10_wp
          config%solver%atol = 1.0e-12_wp
          mirrored = config
@@ -143,11 +154,13 @@ contains
       end do
    end subroutine test_mirror
 
-   !> Turning hinge 0, the chain (a kink at hinge 0 holds the turn) and the loads by an angle about C turns V and u.
+   !> Turning hinge 0, the chain (a kink at hinge 0 holds the turn) and the loads by an angle about C turns V and u. Hinges
+   !> are soft and little wound, so that the motion is not chaotic: in 54 such scenes a disturbance by 1e-13 grew a thousandfold
+   !> at most, and turned scenes differed by 7e-11.
    subroutine test_turn(error)
       type(error_type), allocatable, intent(out) :: error
       type(case_config) :: config, turned
-      type(trajectory) :: motion, image, disturbed
+      type(trajectory) :: motion, image
       type(load_config), allocatable :: loads(:)
       real(wp), parameter :: angle = 0.7_wp
       integer :: which, i
@@ -158,7 +171,9 @@ contains
          config%solver%rtol = 1.0e-13_wp
          config%solver%atol = 1.0e-14_wp
          config%loads%law = 'constant'
-         config%chain%bending_stiffness = 100.0_wp*config%chain%bending_stiffness ! `paper` bears small deflections only
+         call suit_method(config)
+         config%chain%hinge_stiffness = 0.1_wp*config%chain%hinge_stiffness
+         config%initial%phi = 0.25_wp*config%initial%phi
          turned = config
          call turn(config%spacecraft%hinge_x, config%spacecraft%hinge_y, turned%spacecraft%hinge_x, turned%spacecraft%hinge_y)
          call turn(config%initial%velocity_x, config%initial%velocity_y, turned%initial%velocity_x, turned%initial%velocity_y)
@@ -186,17 +201,11 @@ contains
          call integrate(config, [0.2_wp], motion, error)
          if (.not. allocated(error)) call integrate(turned, [0.2_wp], image, error)
          if (allocated(error)) return
-         ! Some of these scenes are chaotic: rounding may do what a disturbance of 1e-13 rad does.
-         config%initial%phi = config%initial%phi + 1.0e-13_wp
-         call integrate(config, [0.2_wp], disturbed, error)
-         if (allocated(error)) return
          associate (row => motion%rows(1), other => image%rows(1))
             call check_close(error, [other%phi - angle, other%alpha, other%phi_rate, other%omega, other%rotation, &
                                      other%energy_kinetic/row%energy_kinetic], &
                              [row%phi, row%alpha, row%phi_rate, row%omega, row%rotation, 1.0_wp], &
-                             1.0e-8_wp*max(1.0_wp, maxval(abs(row%phi_rate))) + &
-                             maxval(abs([disturbed%rows(1)%phi - row%phi, disturbed%rows(1)%phi_rate - row%phi_rate])), &
-                             kind_name(which))
+                             1.0e-9_wp*max(1.0_wp, maxval(abs(row%phi_rate))), kind_name(which))
             if (allocated(error)) return
          end associate
       end do

@@ -567,7 +567,8 @@ contains
    end subroutine test_quasistatic_latch
 
    !> Three rods, the hinge in the middle locked, or as stiff as C with a strong damper: the difference after 0.05 s falls
-   !> as 1/C, and the moment of the stiff spring is that of the lock.
+   !> as 1/C, and the moment of the stiff spring is that of the lock. From C = 1e7 N m/rad on it is a tenth for ten times C to
+   !> 1.1e-3 in 18 scenes; from 1e6 to 1e7 it still is 0.186 in one, where bending rods are about as stiff as the hinge.
    subroutine test_stiff_limit(error)
       type(error_type), allocatable, intent(out) :: error
       type(case_config) :: config
@@ -596,8 +597,8 @@ contains
          end associate
          config%chain%kink(1) = opening(1)
          do i = 1, 2
-            config%chain%hinge_stiffness(1) = 10.0_wp**(5 + i)
-            config%chain%hinge_damping(1) = 10.0_wp**(2 + i)
+            config%chain%hinge_stiffness(1) = 10.0_wp**(6 + i)
+            config%chain%hinge_damping(1) = 10.0_wp**(3 + i)
             call motion_of(stiff, x, config, error)
             if (allocated(error)) return
             call run(stiff, 'bdf', 1.0e-9_wp, 0.05_wp, x, error)
@@ -608,7 +609,7 @@ contains
             if (allocated(error)) return
             difference(i) = maxval(abs(x - y))/maxval(abs(y))
          end do
-         call check(error, difference(2) < 0.13_wp*difference(1) .and. difference(1) < 1.0e-2_wp, 'not a limit')
+         call check(error, abs(difference(2)/difference(1) - 0.1_wp) < 0.005_wp .and. difference(1) < 1.0e-2_wp, 'not a limit')
          if (allocated(error)) return
          allocate (ydot(size(y)))
          call motion%rhs(0.05_wp, y, ydot, ok)

@@ -23,39 +23,47 @@ contains
 
    subroutine collect_method_choice(suite)
       type(unittest), allocatable, intent(out) :: suite(:)
-      suite = [new_test('power iteration finds the fastest rates of scenes of every kind to a fifth', test_fastest), &
+      suite = [new_test('power iteration misses the fastest rates by a fifth in one of 500 scenes at most', test_fastest), &
                new_test('auto costs at most 1.5 times the best method, soft and stiff, damped and not', test_auto)]
    end subroutine collect_method_choice
 
+   !> It knows no bound of its error. Of 14400 such scenes it missed one, and no decay.
    subroutine test_fastest(error)
       type(error_type), allocatable, intent(out) :: error
+      integer, parameter :: n_seeds = 7
       type(case_config) :: config
       type(scene_type) :: scene
       real(wp), allocatable :: q(:), all(:)
       real(wp) :: frequency, decay
-      integer :: which, n
+      integer :: which, n, seed, missed, scenes
+      character(len=80) :: text
 
-      call seed_random(21)
-      do which = 1, n_kinds
-         if (index(kind_name(which), 'exact') > 0) cycle ! relaxing hinges have no K and D of their own
-         do n = 1, 9
-            call random_case(config, which, n)
-            config%chain%kink = 0.0_wp
-            call new_scene(scene, config, error)
-            if (allocated(error)) return
-            allocate (q(scene%n_q), source=0.0_wp) ! springs at rest: no geometric stiffness
-            call fastest_rates(scene, q, frequency, decay)
-            call natural_frequencies(scene, q, all, error)
-            if (allocated(error)) return
-            call check(error, abs(frequency - maxval(all)) <= 0.2_wp*maxval(all), kind_name(which)//': highest frequency')
-            if (allocated(error)) return
-            call decay_rates(scene, q, all, error)
-            if (allocated(error)) return
-            call check(error, abs(decay - maxval(all)) <= 0.2_wp*maxval(all) + 1.0e-12_wp, kind_name(which)//': fastest decay')
-            if (allocated(error)) return
-            deallocate (q)
+      missed = 0
+      scenes = 0
+      do seed = 21, 20 + n_seeds
+         call seed_random(seed)
+         do which = 1, n_kinds
+            if (index(kind_name(which), 'exact') > 0) cycle ! relaxing hinges have no K and D of their own
+            do n = 1, 9
+               call random_case(config, which, n)
+               config%chain%kink = 0.0_wp
+               call new_scene(scene, config, error)
+               if (allocated(error)) return
+               allocate (q(scene%n_q), source=0.0_wp) ! springs at rest: no geometric stiffness
+               call fastest_rates(scene, q, frequency, decay)
+               scenes = scenes + 1
+               call natural_frequencies(scene, q, all, error)
+               if (allocated(error)) return
+               if (abs(frequency - maxval(all)) > 0.2_wp*maxval(all)) missed = missed + 1
+               call decay_rates(scene, q, all, error)
+               if (allocated(error)) return
+               if (abs(decay - maxval(all)) > 0.2_wp*maxval(all) + 1.0e-12_wp) missed = missed + 1
+               deallocate (q)
+            end do
          end do
       end do
+      write (text, '(i0, " of ", i0, " scenes missed")') missed, scenes
+      call check(error, 500*missed <= scenes, trim(text))
    end subroutine test_fastest
 
    subroutine test_auto(error)

@@ -14,6 +14,7 @@ module test_modes
    use test_motions, only: motion_of, eigenvector_error
    use test_random_scenes, only: allocate_case, kind_name, n_kinds, random_case, seed_random
    use test_testing, only: check, check_close, new_test, unittest
+   use test_trajectories, only: integrate, trajectory
    implicit none (type, external)
    private
    public :: collect_modes
@@ -37,7 +38,9 @@ contains
          new_test('free hinges are mechanisms, not small frequencies', free_hinges), &
          new_test('a kink that moves later changes no mode at the start', later_kink), &
          new_test('equilibria are at rest', equilibria), &
-         new_test('a torque on a free spacecraft leaves no equilibrium', no_equilibrium)]
+         new_test('damped motion ends at the equilibrium', damped_motion), &
+         new_test('a torque on a free spacecraft leaves no equilibrium', no_equilibrium), &
+         new_test('a hinge without spring leaves none to be found', no_stiffness)]
    end subroutine collect_modes
 
    subroutine modes_of(motion, y, modes, error)
@@ -459,13 +462,16 @@ contains
 
    end subroutine later_kink
 
+   !> Kinks by their angles; then random chains, bent at the start, with and without kinks, turning slowly and fast. Newton's
+   !> method alone does not find those of some that turn fast.
    subroutine equilibria(error)
       type(error_type), allocatable, intent(out) :: error
       type(case_config) :: config
       type(motion_type) :: motion
-      real(wp), allocatable :: y(:), rate(:)
-      logical :: ok
-      integer :: which
+      real(wp), allocatable :: y(:)
+      integer, parameter :: n_rods(3) = [3, 4, 4]
+      real(wp), parameter :: spin(3) = [1.0_wp, 1.0_wp, 4.0_wp]
+      integer :: which, seed, i
 
       call rigid_chain(config, 3)
       config%chain%kink(:) = [0.5_wp, -0.2_wp, 0.9_wp]
@@ -474,27 +480,110 @@ contains
       if (allocated(error)) return
       call check_close(error, y(:3), [0.5_wp, 0.3_wp, 1.2_wp], rounding, 'kinks')
       if (allocated(error)) return
-      call seed_random(14)
-      do which = 1, n_kinds
-         call random_case(config, which, 4)
-         deallocate (config%loads)
-         allocate (config%loads(0))
-         config%chain%hinge_stiffness = config%chain%hinge_stiffness + 500.0_wp
-         config%initial%phi = 0.0_wp
-         config%initial%omega = 1.0_wp
-         call motion_of(motion, y, config, error, ledger=.false.)
-         if (.not. allocated(error)) call find_equilibrium(motion, 0.0_wp, y, error)
-         if (allocated(error)) return
-         allocate (rate(size(y)))
-         call motion%rhs(0.0_wp, y, rate, ok)
-         associate (r => motion%n_q, m => motion%n_dof)
-            call check(error, maxval(abs(rate(r + 3:r + m))) < 1.0e-6_wp .and. maxval(abs(y(r + 4:r + m))) <= 0.0_wp, &
-                       kind_name(which)//': not at rest')
-         end associate
-         if (allocated(error)) return
-         deallocate (rate)
+      do seed = 11, 22
+         do i = 1, 3
+            call seed_random(seed)
+            do which = 1, n_kinds
+               call random_case(config, which, n_rods(i))
+               deallocate (config%loads)
+               allocate (config%loads(0))
+               config%chain%hinge_stiffness = config%chain%hinge_stiffness + 500.0_wp
+               config%initial%phi = 0.0_wp
+               config%initial%omega = spin(i)
+               call motion_of(motion, y, config, error, ledger=.false.)
+               if (.not. allocated(error)) call find_equilibrium(motion, 0.0_wp, y, error)
+               if (.not. allocated(error)) call check_rest(config, y, kind_name(which), error)
+               if (allocated(error)) return
+            end do
+         end do
       end do
    end subroutine equilibria
+
+   !> Neither rates nor, by both kernels, accelerations of the chain, and the spin of the case.
+   subroutine check_rest(config, y, name, error)
+      type(case_config), intent(in) :: config
+      real(wp), contiguous, intent(in) :: y(:)
+      character(len=*), intent(in) :: name
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: other
+      type(motion_type) :: motion
+      real(wp), allocatable :: start(:)
+      real(wp) :: rate(size(y))
+      logical :: ok
+      integer :: i
+
+      other = config
+      do i = 1, 2
+         other%model%kernel = merge('assembled', 'recursive', i == 1)
+         call motion_of(motion, start, other, error, ledger=.false.)
+         if (allocated(error)) return
+         call motion%rhs(0.0_wp, y, rate, ok)
+         associate (r => motion%n_q, m => motion%n_dof, b => motion%dynamics%scene%n_base)
+            ok = ok .and. maxval(abs(y(r + b + 1:r + m))) <= 0.0_wp .and. maxval(abs(rate(r + min(b + 1, 3):r + m))) < 1.0e-6_wp
+            if (b > 0) ok = ok .and. abs(y(r + 3) - config%initial%omega) <= 0.0_wp
+         end associate
+         call check(error, ok, name//': not at rest')
+         if (allocated(error)) return
+      end do
+   end subroutine check_rest
+
+   !> Chains with kinks, under forces at their nodes, that come to rest in their dampers.
+   subroutine damped_motion(error)
+      type(error_type), allocatable, intent(out) :: error
+      integer, parameter :: kinds(3) = [8, 10, 13] ! fixed: bending rods, rigid rods, massless rods that bend
+      type(case_config) :: config
+      type(motion_type) :: motion
+      type(trajectory) :: settling
+      real(wp), allocatable :: y(:)
+      integer :: i, seed
+
+      do seed = 1, 2
+         call seed_random(seed)
+         do i = 1, size(kinds)
+            call random_case(config, kinds(i), 3)
+            config%loads = config%loads(4:5)
+            config%loads%law = 'constant'
+            config%loads%value = 0.1_wp*config%loads%value
+            config%chain%hinge_stiffness = config%chain%hinge_stiffness + 500.0_wp
+            config%chain%hinge_damping = 0.5_wp*config%chain%hinge_stiffness
+            if (i == 1) config%chain%hinge_damping = 0.2_wp*config%chain%hinge_damping ! or the rods vibrate between stiff dampers
+            config%initial%phi = 0.0_wp
+            config%initial%phi_rate = 0.0_wp
+            config%initial%alpha = 0.0_wp
+            config%initial%beta = 0.0_wp
+            config%initial%alpha_rate = 0.0_wp
+            config%initial%beta_rate = 0.0_wp
+            config%solver%method = 'bdf'
+            config%solver%rtol = 1.0e-6_wp
+            config%solver%atol = 1.0e-8_wp
+            call motion_of(motion, y, config, error, ledger=.false.)
+            if (.not. allocated(error)) call find_equilibrium(motion, 0.0_wp, y, error)
+            if (.not. allocated(error)) call integrate(config, [240.0_wp], settling, error)
+            if (allocated(error)) return
+            call check(error, maxval(abs(y(:3))) > 0.1_wp, kind_name(kinds(i))//': it begins where it ends')
+            if (allocated(error)) return
+            call check_close(error, settling%rows(1)%phi, y(:3), 1.0e-8_wp, kind_name(kinds(i)))
+            if (allocated(error)) return
+         end do
+      end do
+   end subroutine damped_motion
+
+   subroutine no_stiffness(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable :: refusal
+      type(case_config) :: config
+      type(motion_type) :: motion
+      real(wp), allocatable :: y(:)
+
+      call rigid_chain(config, 2)
+      config%chain%hinge_stiffness(1) = 0.0_wp
+      call motion_of(motion, y, config, error, ledger=.false.)
+      if (allocated(error)) return
+      call find_equilibrium(motion, 0.0_wp, y, refusal)
+      call check(error, allocated(refusal), 'accepted')
+      if (allocated(error)) return
+      call check(error, index(refusal%message, 'the stiffness is singular') > 0, refusal%message)
+   end subroutine no_stiffness
 
    subroutine no_equilibrium(error)
       type(error_type), allocatable, intent(out) :: error

@@ -1,17 +1,25 @@
 !> Relative equilibrium near a state: the chain at rest on a spacecraft that keeps its spin, under constant loads and kinks.
 !>
-!> Newton's method on the exact Jacobian, for the coordinates of the chain (and the rotations of relaxing hinges), damped by
-!> the natural monotonicity test (Deuflhard, Newton Methods for Nonlinear Problems, sec. 3.3): a step is accepted if the next
-!> one, with the same Jacobian, is shorter. Translation does not matter: nothing depends on the place, and constant forces may
+!> Newton's method for the coordinates of the chain (and the rotations of relaxing hinges), damped by the natural monotonicity
+!> test (Deuflhard, Newton Methods for Nonlinear Problems, sec. 3.3): a step is accepted if the next one, with the same
+!> Jacobian, is shorter. What is brought to zero are forces, not accelerations: the derivative of M^-1 h is that of M^-1 far
+!> from the equilibrium, that of h little else than the stiffness. With the balance M a = h of spacecraft (b) and chain (c)
+!> the chain at rest lacks
+!>
+!>     r = h_c - M_cb a_b,   M_bb a_b = h_b,
+!>
+!> while the spacecraft accelerates as a_b says, and dr/dq = -(dR_c/dq - M_cb M_bb^-1 dR_b/dq) with the tangent of the balance
+!> R = M a - h at a = (a_b, 0). Translation does not matter: nothing depends on the place, and constant forces may
 !> accelerate the whole. A spin that grows is no equilibrium. Locked hinges stay locked, the others take the laws that hold at
 !> the equilibrium (stops, freeplay).
 module rodyn_equilibrium
    use rodyn_kinds, only: wp
    use rodyn_text, only: formatted
    use rodyn_errors, only: error_type, raise
-   use rodyn_lapack, only: dgetrf, dgetrs
-   use rodyn_locks, only: expand, expansion_matrix, free_coordinates, has_slaves
-   use rodyn_motion, only: motion_type
+   use rodyn_assembled, only: mass_matrix, new_assembled_system
+   use rodyn_lapack, only: dgetrf, dgetrs, dpotrf, dpotrs
+   use rodyn_locks, only: expand, expansion_matrix, free_coordinates, has_slaves, reduce
+   use rodyn_motion, only: balance_derivatives, motion_type
    implicit none (type, external)
    private
    public :: find_equilibrium
@@ -21,11 +29,18 @@ module rodyn_equilibrium
    real(wp), parameter :: longest_step = 0.5_wp    !! change of an angle in one step [rad]
    real(wp), parameter :: smallest_share = 1.0e-4_wp !! of a step, before the search is given up
    real(wp), parameter :: close_enough = 1.0e-9_wp !! the step after one so short is at rounding level [rad]
+   integer, parameter :: most_creeping_steps = 400
+   real(wp), parameter :: creeping_step = 0.1_wp   !! largest change of an angle in one of them [rad]
 
-   !> LU factors of the chain's part of the Jacobian, without angles that locks make redundant.
+   !> What the chain lacks at a state, and LU factors of its derivative there or at a state before; both without angles
+   !> that locks make redundant.
    type :: newton_solver
-      integer, allocatable :: kept(:) !! the chain's coordinates that are left, and rotations of relaxing hinges: places in q
-      integer, allocatable :: rows(:) !! their equations: places in y'
+      integer, allocatable :: chain(:)   !! the chain's coordinates that are left: places in q and p'
+      integer, allocatable :: joints(:)  !! relaxing hinges that are not locked
+      integer, allocatable :: kept(:)    !! both: places in q
+      real(wp), allocatable :: lacking(:)      !! r of these coordinates, th' of these hinges
+      real(wp), allocatable :: acceleration(:) !! (a_b, 0) (n_dof)
+      real(wp), allocatable :: carried(:, :)   !! M_cb M_bb^-1 (n_dof, n_base)
       real(wp), allocatable :: lu(:, :), scale(:)
       integer, allocatable :: pivots(:)
    end type newton_solver
@@ -58,75 +73,210 @@ contains
       real(wp), intent(in) :: t                    !! [s]
       real(wp), contiguous, intent(inout) :: y(:)  !! (q, p, ...)
       type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: jac(:, :), x(:), step(:), next(:)
+      real(wp), allocatable :: start(:)
       type(newton_solver) :: solver
-      real(wp) :: share
-      logical :: ok, last
-      integer :: i
+      logical :: ok
 
       if (motion%dynamics%varying) then
          call raise(error, 'no equilibrium: a load or a kink varies in time')
          return
       end if
+      call new_newton_solver(solver, motion, error)
+      if (allocated(error)) return
       associate (b => motion%dynamics%scene%n_base, r => motion%n_q, m => motion%n_dof)
          y(r + b + 1:r + m) = 0.0_wp
-         allocate (jac(size(y), size(y)))
-         last = .false.
+         start = y(b + 1:r)
+         call iterate(solver, motion, t, y, ok, error)
+         if (.not. (ok .or. allocated(error))) then
+            y(b + 1:r) = start
+            call creep(solver, motion, t, y)
+            call iterate(solver, motion, t, y, ok, error)
+         end if
+         if (allocated(error)) return
+         if (.not. ok) then
+            call raise(error, "no equilibrium was found near the initial state: neither Newton's method nor a slow motion "// &
+                       'leads to one from there')
+            return
+         end if
+         if (b > 0) call check_spin(motion, t, y, error)
+      end associate
+   end subroutine find_with_laws
+
+   !> Newton's method from a state. Not `ok`: it does not converge.
+   subroutine iterate(solver, motion, t, y, ok, error)
+      type(newton_solver), intent(inout) :: solver
+      type(motion_type), intent(inout) :: motion
+      real(wp), intent(in) :: t
+      real(wp), contiguous, intent(inout) :: y(:)
+      logical, intent(out) :: ok
+      type(error_type), allocatable, intent(out) :: error !! the stiffness is singular
+      real(wp), allocatable :: x(:), step(:), next(:)
+      real(wp) :: share
+      integer :: i
+
+      associate (b => motion%dynamics%scene%n_base, r => motion%n_q)
+         call find_lacking(solver, motion, t, y, ok)
+         if (.not. ok) return
          do i = 1, most_steps
-            call motion%jacobian(t, y, jac, ok)
-            if (ok) call factorise(solver, motion, jac, ok)
+            call factorise(solver, motion, y, 0.0_wp, ok)
             if (.not. ok) then
                call raise(error, 'no equilibrium: the stiffness is singular (a hinge without spring?)')
                return
             end if
-            call newton_step(solver, motion, t, y, step, ok)
-            if (.not. ok) exit
+            call newton_step(solver, motion, step, ok)
+            if (.not. ok) return
             x = y(b + 1:r)
-            share = min(1.0_wp, longest_step/max(maxval(abs(step)), tiny(1.0_wp)))
+            if (maxval(abs(step)) <= close_enough) then
+               y(b + 1:r) = x + step
+               return
+            end if
+            share = min(1.0_wp, longest_step/maxval(abs(step)))
             do
                y(b + 1:r) = x + share*step
-               if (last) exit
-               call newton_step(solver, motion, t, y, next, ok)
-               if (ok) ok = norm2(next) <= (1.0_wp - 0.5_wp*share)*norm2(step) .or. maxval(abs(step)) <= close_enough
+               call find_lacking(solver, motion, t, y, ok)
+               if (ok) call newton_step(solver, motion, next, ok)
+               if (ok) ok = norm2(next) <= (1.0_wp - 0.5_wp*share)*norm2(step)
                if (ok .or. share < smallest_share) exit
                share = 0.5_wp*share
             end do
-            if (.not. ok .or. last) exit
-            last = maxval(abs(step)) <= close_enough
+            if (.not. ok) return
          end do
-         if (.not. (ok .and. last)) then
-            call raise(error, "no equilibrium was found near the initial state: Newton's method does not converge from there")
-            return
-         end if
-         if (b > 0) call check_spin(motion, t, y, maxval(abs(jac(r + 3:r + m, :))), error)
       end associate
-   end subroutine find_with_laws
+      ok = .false.
+   end subroutine iterate
 
-   !> Factor the part of the Jacobian that belongs to the chain, rows brought to a common scale. Not `ok`: singular.
-   subroutine factorise(solver, motion, jac, ok)
+   !> Where Newton's path ends at a singular stiffness: the motion M q' = h of the chain in a viscous medium leads past it, to
+   !> an equilibrium that is stable there. Implicit steps of Euler's method, linearised, whose length follows from how far they go
+   !> (pseudo-transient continuation, Kelley & Keyes, SIAM J. Numer. Anal. 35, 1998, 508).
+   subroutine creep(solver, motion, t, y)
+      type(newton_solver), intent(inout) :: solver
+      type(motion_type), intent(inout) :: motion
+      real(wp), intent(in) :: t
+      real(wp), contiguous, intent(inout) :: y(:)
+      real(wp), allocatable :: x(:), step(:)
+      real(wp) :: drag !! the inverse of the step in time [1/s^2]
+      logical :: ok
+      integer :: i, short
+
+      drag = 1.0_wp
+      short = 0
+      associate (b => motion%dynamics%scene%n_base, r => motion%n_q)
+         x = y(b + 1:r)
+         call find_lacking(solver, motion, t, y, ok)
+         do i = 1, most_creeping_steps
+            if (ok) call factorise(solver, motion, y, drag, ok)
+            if (ok) call newton_step(solver, motion, step, ok)
+            if (ok) ok = maxval(abs(step)) <= creeping_step
+            if (ok) then
+               y(b + 1:r) = x + step
+               call find_lacking(solver, motion, t, y, ok)
+            end if
+            if (ok) then
+               x = y(b + 1:r)
+               short = merge(short + 1, 0, maxval(abs(step)) < 0.01_wp*creeping_step)
+               if (short == 10) return ! at rest, whatever the drag
+               drag = 0.25_wp*drag
+            else
+               drag = 4.0_wp*drag
+               y(b + 1:r) = x
+               call find_lacking(solver, motion, t, y, ok)
+            end if
+         end do
+      end associate
+   end subroutine creep
+
+   !> What of the state is sought.
+   subroutine new_newton_solver(solver, motion, error)
+      type(newton_solver), intent(out) :: solver
+      type(motion_type), intent(inout) :: motion
+      type(error_type), allocatable, intent(out) :: error
+      integer, allocatable :: free(:)
+      integer :: i
+
+      associate (b => motion%dynamics%scene%n_base, r => motion%n_q, m => motion%n_dof, scene => motion%dynamics%scene)
+         if (.not. allocated(motion%system%m)) call new_assembled_system(motion%system, scene, error)
+         if (allocated(error)) return
+         free = free_coordinates(scene)
+         solver%chain = free(b + 1:)
+         solver%joints = pack([(i, i=1, r - m)], .not. scene%hinges%locked(scene%hinges%relaxing))
+         solver%kept = [solver%chain, m + solver%joints]
+         associate (n => size(solver%kept))
+            allocate (solver%lacking(n), solver%acceleration(m), solver%carried(m, b), solver%pivots(n))
+         end associate
+      end associate
+   end subroutine new_newton_solver
+
+   !> The balance at a state, from the accelerations of the kernel: h = M a.
+   subroutine find_lacking(solver, motion, t, y, ok)
+      type(newton_solver), intent(inout) :: solver
+      type(motion_type), intent(inout) :: motion
+      real(wp), intent(in) :: t
+      real(wp), contiguous, intent(in) :: y(:)
+      logical, intent(out) :: ok
+      real(wp) :: rate(size(y)), forces(motion%n_dof), inertia(3, 3)
+      real(wp) :: by_base(3, motion%n_dof)
+      integer :: j, info
+
+      call motion%rhs(t, y, rate, ok)
+      if (.not. ok) return
+      associate (b => motion%dynamics%scene%n_base, r => motion%n_q, m => motion%n_dof, scene => motion%dynamics%scene, &
+                 work => motion%dynamics%work, mass => motion%system%m)
+         call mass_matrix(motion%system, scene, work%sine, work%cosine, y(1:r))
+         forces = matmul(mass, rate(r + 1:r + m))
+         solver%carried = mass(:, 1:b)
+         if (has_slaves(scene)) then
+            call reduce(scene, forces)
+            do j = 1, b
+               call reduce(scene, solver%carried(:, j))
+            end do
+         end if
+         solver%acceleration = 0.0_wp
+         if (b > 0) then
+            inertia = mass(1:3, 1:3)
+            by_base = transpose(solver%carried)
+            call dpotrf('L', 3, inertia, 3, info)
+            ok = info == 0
+            if (.not. ok) return
+            call dpotrs('L', 3, m, inertia, 3, by_base, 3, info)
+            solver%acceleration(1:3) = forces(1:3)
+            call dpotrs('L', 3, 1, inertia, 3, solver%acceleration, 3, info)
+            solver%carried = transpose(by_base)
+         end if
+         forces = forces - matmul(solver%carried, forces(1:b))
+         solver%lacking = [forces(solver%chain), rate(m + solver%joints)]
+      end associate
+      ok = all(abs(solver%lacking) <= huge(1.0_wp))
+   end subroutine find_lacking
+
+   !> Factor the derivative of what is lacking at the state that it belongs to, rows brought to a common scale. Not `ok`: singular.
+   subroutine factorise(solver, motion, y, drag, ok)
       type(newton_solver), intent(inout) :: solver
       type(motion_type), intent(in) :: motion
-      real(wp), intent(in) :: jac(:, :)
+      real(wp), intent(in) :: y(:)
+      real(wp), intent(in) :: drag !! times the mass matrix is added [1/s^2]
       logical, intent(out) :: ok
       real(wp), allocatable :: expansion(:, :)
-      integer, allocatable :: chain(:), joints(:)
+      real(wp) :: tangent(motion%n_q, motion%n_q)
       integer :: i, info, n
 
       associate (b => motion%dynamics%scene%n_base, r => motion%n_q, m => motion%n_dof, scene => motion%dynamics%scene)
-         chain = free_coordinates(scene)
-         chain = chain(b + 1:)
-         joints = m + pack([(i, i=1, r - m)], .not. scene%hinges%locked(scene%hinges%relaxing))
-         solver%kept = [chain, joints]
-         solver%rows = [r + chain, joints]
-         n = size(solver%kept)
-         if (.not. allocated(solver%pivots)) allocate (solver%pivots(n))
+         call balance_derivatives(motion, y, solver%acceleration, tangent(1:m, :), tangent(m + 1:r, :))
+         tangent(1:m, 1:m) = tangent(1:m, 1:m) + drag*motion%system%m
+         tangent(m + 1:r, :) = -tangent(m + 1:r, :)
+         if (has_slaves(scene)) then
+            do i = 1, m
+               call reduce(scene, tangent(1:m, i))
+            end do
+         end if
+         tangent(1:m, :) = tangent(1:m, :) - matmul(solver%carried, tangent(1:b, :))
          if (has_slaves(scene)) then ! and no relaxing hinges
             expansion = expansion_matrix(scene)
-            solver%lu = matmul(jac(solver%rows, 1:m), expansion(:, b + 1:))
+            solver%lu = matmul(tangent(solver%chain, :), expansion(:, b + 1:))
          else
-            solver%lu = jac(solver%rows, solver%kept)
+            solver%lu = tangent(solver%kept, solver%kept)
          end if
       end associate
+      n = size(solver%lacking)
       solver%scale = maxval(abs(solver%lu), dim=2)
       ok = all(solver%scale > 0.0_wp)
       if (.not. ok .or. n == 0) return ! every hinge of a rigid chain is locked
@@ -138,23 +288,21 @@ contains
       if (ok) ok = all([(abs(solver%lu(i, i)) > 1.0e2_wp*n*epsilon(1.0_wp), i=1, n)])
    end subroutine factorise
 
-   !> The step of the chain from y by the factors at hand: -J^-1 (p', th'), and what follows from it by locks.
-   subroutine newton_step(solver, motion, t, y, step, ok)
+   !> The step of the chain by the factors at hand, and what follows from it by locks.
+   subroutine newton_step(solver, motion, step, ok)
       type(newton_solver), intent(in) :: solver
-      type(motion_type), intent(inout) :: motion
-      real(wp), intent(in) :: t
-      real(wp), contiguous, intent(in) :: y(:)
+      type(motion_type), intent(in) :: motion
       real(wp), allocatable, intent(out) :: step(:)
       logical, intent(out) :: ok
-      real(wp) :: rate(size(y)), whole(motion%n_q), still(0:motion%dynamics%scene%n - 1)
+      real(wp) :: whole(motion%n_q), still(0:motion%dynamics%scene%n - 1)
       integer :: info, n
 
       n = size(solver%scale)
-      call motion%rhs(t, y, rate, ok)
-      associate (b => motion%dynamics%scene%n_base, r => motion%n_q, m => motion%n_dof, scene => motion%dynamics%scene)
-         step = -rate(solver%rows)/solver%scale
-         if (ok .and. n > 0) call dgetrs('N', n, 1, solver%lu, n, solver%pivots, step, n, info)
-         if (ok .and. n > 0) ok = info == 0 .and. all(abs(step) <= huge(step))
+      ok = .true.
+      associate (b => motion%dynamics%scene%n_base, m => motion%n_dof, scene => motion%dynamics%scene)
+         step = solver%lacking/solver%scale
+         if (n > 0) call dgetrs('N', n, 1, solver%lu, n, solver%pivots, step, n, info)
+         if (n > 0) ok = info == 0 .and. all(abs(step) <= huge(step))
          whole = 0.0_wp
          whole(solver%kept) = step
          still = 0.0_wp
@@ -164,18 +312,20 @@ contains
    end subroutine newton_step
 
    !> A chain may rest on a spacecraft that turns ever faster, but not for long.
-   subroutine check_spin(motion, t, y, largest, error)
+   subroutine check_spin(motion, t, y, error)
       type(motion_type), intent(inout) :: motion
       real(wp), intent(in) :: t
       real(wp), contiguous, intent(in) :: y(:)
-      real(wp), intent(in) :: largest !! of the derivatives of the accelerations: their rounding errors
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: rate(size(y))
+      real(wp) :: rate(size(y)), jac(size(y), size(y))
       logical :: ok
 
-      call motion%rhs(t, y, rate, ok)
-      associate (spin_rate => rate(motion%n_q + 3))
-         if (ok .and. abs(spin_rate) <= 1.0e3_wp*epsilon(1.0_wp)*max(1.0_wp, largest)) return
+      call motion%jacobian(t, y, jac, ok)
+      if (ok) call motion%rhs(t, y, rate, ok)
+      associate (r => motion%n_q, m => motion%n_dof, spin_rate => rate(motion%n_q + 3))
+         ! The derivatives of the accelerations tell of their rounding errors.
+         if (ok) ok = abs(spin_rate) <= 1.0e3_wp*epsilon(1.0_wp)*max(1.0_wp, maxval(abs(jac(r + 3:r + m, :))))
+         if (ok) return
          call raise(error, "no equilibrium: the loads turn the spacecraft ever faster, omega' = "// &
                     formatted(spin_rate, '(es10.3)')//' rad/s^2')
       end associate

@@ -24,7 +24,7 @@ module rodyn_motion
    use rodyn_lapack, only: dpotrf, dpotrs
    implicit none (type, external)
    private
-   public :: motion_type, new_motion, initial_state, state_invariants, differentiate_balance
+   public :: motion_type, new_motion, initial_state, state_invariants, differentiate_balance, balance_derivatives
 
    !> A running scene.
    type, extends(mechanical_system) :: motion_type
@@ -364,8 +364,6 @@ contains
       real(wp), intent(out) :: joints(self%n_q - self%n_dof, self%n_q)     !! dth'/dq
       logical, intent(out) :: ok                   !! false: no accelerations, or no memory
       type(error_type), allocatable :: error
-      real(wp) :: direction(self%n_q + self%n_dof)
-      integer :: j
 
       ok = .true.
       associate (r => self%n_q, m => self%n_dof, scene => self%dynamics%scene, work => self%dynamics%work)
@@ -373,17 +371,32 @@ contains
          if (.not. allocated(error)) call self%dynamics%accelerations(t, y(1:r), y(r + 1:r + m), a, ok)
          ok = ok .and. .not. allocated(error)
          if (.not. ok) return
+         call balance_derivatives(self, y, a, by_state, joints)
+         call mass_matrix(self%system, scene, work%sine, work%cosine, y(1:r))
+      end associate
+   end subroutine differentiate_balance
+
+   !> The same with any p', under the loads of the last evaluation: as many of the columns as there is room for.
+   subroutine balance_derivatives(self, y, a, by_state, joints)
+      class(motion_type), intent(in) :: self
+      real(wp), intent(in) :: y(:)            !! (q, p, ...)
+      real(wp), intent(in) :: a(:)            !! p', held fixed (n_dof)
+      real(wp), intent(out) :: by_state(:, :) !! columns dR/dq and, behind them, dR/dp (n_dof, n_q or more)
+      real(wp), intent(out) :: joints(:, :)   !! dth'/dq of relaxing hinges (n_q - n_dof, n_q)
+      real(wp) :: direction(self%n_q + self%n_dof)
+      integer :: j
+
+      associate (r => self%n_q, m => self%n_dof)
          direction = 0.0_wp
-         do j = 1, r + m
+         do j = 1, size(by_state, 2)
             direction(j) = 1.0_wp
-            call balance_tangent(scene, y(1:r), y(r + 1:r + m), a, self%dynamics%regime%on_nodes, &
+            call balance_tangent(self%dynamics%scene, y(1:r), y(r + 1:r + m), a, self%dynamics%regime%on_nodes, &
                                  self%dynamics%forces%node, direction(1:r), direction(r + 1:), by_state(:, j))
             if (r > m .and. j <= r) call relaxation_column(self, direction(1:r), direction(r + 1:), joints(:, j))
             direction(j) = 0.0_wp
          end do
-         call mass_matrix(self%system, scene, work%sine, work%cosine, y(1:r))
       end associate
-   end subroutine differentiate_balance
+   end subroutine balance_derivatives
 
    !> Exact Jacobian: the linearised balance solved with the mass matrix, from which what locked hinges make redundant is
    !> eliminated (`rodyn_locks`). It takes the coordinates as they stand, also where they break the constraints.
