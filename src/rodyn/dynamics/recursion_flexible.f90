@@ -17,12 +17,18 @@
 module rodyn_recursion_flexible
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp
+   use rodyn_outward, only: outward_size
    use rodyn_rod_constants, only: rod_constants
    use rodyn_spacecraft, only: spacecraft_body, spacecraft_accelerations
    use rodyn_hinge_law, only: hinge_law
    implicit none (type, external)
    private
    public :: flexible_accelerations
+
+   ! Places in `outward` (`rodyn_outward`).
+   integer, parameter :: of_turn = 1, of_along = 3, of_cross = 5, &
+                         of_alpha = 7, of_beta = 9, of_pull = 11, of_cosine = 13, of_sine = 15, of_down = 17, &
+                         of_kept = 19
 
 contains
 
@@ -41,7 +47,7 @@ contains
       real(wp), intent(in) :: base_force(3)         !! X_C, Y_C, M_C, moving axes
       logical, intent(in) :: loaded                 !! node_force is to be used
       real(wp), intent(in) :: node_force(2, *)      !! X, Y at nodes (n), moving axes [N]
-      real(wp), intent(out) :: outward(10, n)       !! workspace
+      real(wp), intent(out) :: outward(outward_size, n) !! workspace
       real(wp), intent(out) :: acceleration(n_base + 3*n) !! p'
       logical, intent(out) :: ok                    !! false: not finite, or M not positive definite (large deflections in `paper`)
 
@@ -109,8 +115,8 @@ contains
             gq = rod%g(1)*qa + rod%g(2)*qb
             hq = rod%h(1)*qa + rod%h(2)*qb
             r0 = moment_out - moment_in - hq - w2*(i%sa*alpha + i%sb*beta) - w*mvv_rate
-            outward(4, k) = w2*alpha + rod%b_inverse(1)*qa + rod%b_inverse(2)*qb
-            outward(5, k) = w2*beta + rod%b_inverse(2)*qa + rod%b_inverse(3)*qb
+            outward(of_alpha, k) = w2*alpha + rod%b_inverse(1)*qa + rod%b_inverse(2)*qb
+            outward(of_beta, k) = w2*beta + rod%b_inverse(2)*qa + rod%b_inverse(3)*qb
 
             moment_out = moment_in
 
@@ -132,14 +138,14 @@ contains
             r0 = r0*inv
             be = be - pee*lw2
             bn = bn - pen*lw2
-            outward(1, k) = r0 - (rod%length*inv)*bn
-            outward(2, k) = ce*inv
-            outward(3, k) = cn*inv
-            outward(6, k) = lw2
-            outward(7, k) = cd
-            outward(8, k) = sd
-            outward(9, k) = down
-            outward(10, k) = kept
+            outward(of_turn, k) = r0 - (rod%length*inv)*bn
+            outward(of_along, k) = ce*inv
+            outward(of_cross, k) = cn*inv
+            outward(of_pull, k) = lw2
+            outward(of_cosine, k) = cd
+            outward(of_sine, k) = sd
+            outward(of_down, k) = down
+            outward(of_kept, k) = kept
 
             ! The chain seen from the inner node: P in the axes of rod k, b already in those of rod k - 1.
             be = be - (w2*i%m1 + w*mv_rate)
@@ -170,14 +176,14 @@ contains
 
       do k = 1, n
          associate (g => rods(rod_of(k))%g, h => rods(rod_of(k))%h, length => rods(rod_of(k))%length)
-            ee = outward(7, k)*ae + outward(8, k)*an
-            nn = outward(7, k)*an - outward(8, k)*ae
-            w_rate = outward(1, k) - outward(2, k)*ee - outward(3, k)*nn
+            ee = outward(of_cosine, k)*ae + outward(of_sine, k)*an
+            nn = outward(of_cosine, k)*an - outward(of_sine, k)*ae
+            w_rate = outward(of_turn, k) - outward(of_along, k)*ee - outward(of_cross, k)*nn
             acceleration(ip + k) = w_rate - omega_rate
-            acceleration(ia + k) = outward(4, k) - g(1)*nn - h(1)*w_rate
-            acceleration(ib + k) = outward(5, k) - g(2)*nn - h(2)*w_rate
-            an = outward(9, k)*ae + (outward(10, k)*an + length*outward(1, k))
-            ae = ee - outward(6, k)
+            acceleration(ia + k) = outward(of_alpha, k) - g(1)*nn - h(1)*w_rate
+            acceleration(ib + k) = outward(of_beta, k) - g(2)*nn - h(2)*w_rate
+            an = outward(of_down, k)*ae + (outward(of_kept, k)*an + length*outward(of_turn, k))
+            ae = ee - outward(of_pull, k)
          end associate
       end do
       ok = ieee_is_finite(an) .and. smallest > 0.0_wp .and. base_smallest > 0.0_wp

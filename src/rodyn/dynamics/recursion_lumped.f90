@@ -7,11 +7,15 @@
 module rodyn_recursion_lumped
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp
+   use rodyn_outward, only: outward_size
    use rodyn_rod_constants, only: rod_constants
    use rodyn_spacecraft, only: spacecraft_body, spacecraft_accelerations
    implicit none (type, external)
    private
    public :: lumped_accelerations
+
+   ! Places in `outward` (`rodyn_outward`).
+   integer, parameter :: of_shear = 1, of_along = 3, of_pull = 5, of_cosine = 7, of_sine = 9
 
 contains
 
@@ -29,7 +33,7 @@ contains
       real(wp), intent(in) :: base_force(3)         !! X_C, Y_C, M_C, moving axes
       logical, intent(in) :: loaded                 !! node_force is to be used
       real(wp), intent(in) :: node_force(2, *)      !! X, Y at nodes (n), moving axes [N]
-      real(wp), intent(out) :: outward(10, n)       !! workspace
+      real(wp), intent(out) :: outward(outward_size, n) !! workspace
       real(wp), intent(out) :: acceleration(n_base + n) !! p'
       logical, intent(out) :: ok                    !! false: not finite
 
@@ -57,17 +61,17 @@ contains
             inv = 1.0_wp/(mu + a*sd**2)
             ratio = a*cd*sd*inv
             a = mu*(mu + a)*inv
-            outward(1, k) = (shear - bn)*inv
-            outward(2, k) = ratio
-            outward(3, k) = lw2
+            outward(of_shear, k) = (shear - bn)*inv
+            outward(of_along, k) = ratio
+            outward(of_pull, k) = lw2
             be = be - a*lw2 - ratio*(bn - shear)
             bn = shear
          end associate
 
          cd = cosine(k)*cosine(k - 1) + sine(k)*sine(k - 1)
          sd = sine(k)*cosine(k - 1) - cosine(k)*sine(k - 1)
-         outward(4, k) = cd
-         outward(5, k) = sd
+         outward(of_cosine, k) = cd
+         outward(of_sine, k) = sd
          r = cd*be - sd*bn
          bn = sd*be + cd*bn
          be = r
@@ -79,12 +83,12 @@ contains
       if (n_base > 0) omega_rate = acceleration(3)
 
       do k = 1, n
-         cd = outward(4, k)
-         sd = outward(5, k)
+         cd = outward(of_cosine, k)
+         sd = outward(of_sine, k)
          r = cd*ae + sd*an
          an = cd*an - sd*ae
-         ae = r - outward(3, k)
-         outer_an = outward(1, k) - outward(2, k)*ae ! acceleration of node k across the rod
+         ae = r - outward(of_pull, k)
+         outer_an = outward(of_shear, k) - outward(of_along, k)*ae ! acceleration of node k across the rod
          acceleration(n_base + k) = (outer_an - an)/rods(rod_of(k))%length - omega_rate
          an = outer_an
       end do

@@ -5,11 +5,16 @@
 module rodyn_recursion_rigid
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp
+   use rodyn_outward, only: outward_size
    use rodyn_rod_constants, only: rod_constants
    use rodyn_spacecraft, only: spacecraft_body, spacecraft_accelerations
    implicit none (type, external)
    private
    public :: rigid_accelerations
+
+   ! Places in `outward` (`rodyn_outward`).
+   integer, parameter :: of_turn = 1, of_along = 3, of_cross = 5, &
+                         of_pull = 7, of_cosine = 9, of_sine = 11, of_down = 13, of_kept = 15
 
 contains
 
@@ -27,7 +32,7 @@ contains
       real(wp), intent(in) :: base_force(3)         !! X_C, Y_C, M_C, moving axes
       logical, intent(in) :: loaded                 !! node_force is to be used
       real(wp), intent(in) :: node_force(2, *)      !! X, Y at nodes (n), moving axes [N]
-      real(wp), intent(out) :: outward(10, n)       !! workspace
+      real(wp), intent(out) :: outward(outward_size, n) !! workspace
       real(wp), intent(out) :: acceleration(n_base + n) !! p'
       logical, intent(out) :: ok                    !! false: not finite
 
@@ -71,14 +76,14 @@ contains
             bn = bn - pen*lw2
             down = -(arm*sd + length*ce*cd)*inv
             kept = (arm*cd - length*ce*sd)*inv
-            outward(1, k) = r0 - (length*inv)*bn
-            outward(2, k) = ce*inv
-            outward(3, k) = cn*inv
-            outward(4, k) = lw2
-            outward(5, k) = cd
-            outward(6, k) = sd
-            outward(7, k) = down
-            outward(8, k) = kept
+            outward(of_turn, k) = r0 - (length*inv)*bn
+            outward(of_along, k) = ce*inv
+            outward(of_cross, k) = cn*inv
+            outward(of_pull, k) = lw2
+            outward(of_cosine, k) = cd
+            outward(of_sine, k) = sd
+            outward(of_down, k) = down
+            outward(of_kept, k) = kept
 
             be = be - w2*i%m1
             r = cd*be + (cd*ce - sd*cn)*r0 + down*bn
@@ -104,12 +109,12 @@ contains
 
       do k = 1, n
          associate (length => rods(rod_of(k))%length)
-            ee = outward(5, k)*ae + outward(6, k)*an
-            nn = outward(5, k)*an - outward(6, k)*ae
-            w_rate = outward(1, k) - outward(2, k)*ee - outward(3, k)*nn
+            ee = outward(of_cosine, k)*ae + outward(of_sine, k)*an
+            nn = outward(of_cosine, k)*an - outward(of_sine, k)*ae
+            w_rate = outward(of_turn, k) - outward(of_along, k)*ee - outward(of_cross, k)*nn
             acceleration(n_base + k) = w_rate - omega_rate
-            an = outward(7, k)*ae + (outward(8, k)*an + length*outward(1, k))
-            ae = ee - outward(4, k)
+            an = outward(of_down, k)*ae + (outward(of_kept, k)*an + length*outward(of_turn, k))
+            ae = ee - outward(of_pull, k)
          end associate
       end do
       ok = ieee_is_finite(an)

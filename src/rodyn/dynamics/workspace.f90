@@ -1,6 +1,7 @@
 !> Memory of one running scene: all that the right-hand side writes besides its result. One per thread.
 module rodyn_workspace
    use rodyn_kinds, only: wp
+   use rodyn_outward, only: outward_size
    use rodyn_scene, only: scene_type
    implicit none (type, external)
    private
@@ -11,7 +12,7 @@ module rodyn_workspace
       real(wp), allocatable :: cosine(:)     !! cos phi_k (0:n), 1 at k = 0
       real(wp), allocatable :: theta(:)      !! joint rotations (0:n-1) [rad]
       real(wp), allocatable :: moment(:)     !! hinge moments T (0:n) [N m]
-      real(wp), allocatable :: outward(:, :) !! what the inward pass leaves for the outward pass (10, n)
+      real(wp), allocatable :: outward(:, :) !! what the inward pass leaves for the outward pass (outward_size, n)
    end type workspace_type
 
 contains
@@ -22,7 +23,7 @@ contains
       type(scene_type), intent(in) :: scene
 
       associate (n => scene%n)
-         allocate (work%sine(0:n), work%cosine(0:n), work%theta(0:n - 1), work%moment(0:n), work%outward(10, n), &
+         allocate (work%sine(0:n), work%cosine(0:n), work%theta(0:n - 1), work%moment(0:n), work%outward(outward_size, n), &
                    source=0.0_wp)
       end associate
       work%cosine(0) = 1.0_wp
