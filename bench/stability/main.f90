@@ -1,10 +1,12 @@
 !> Measurements for bench/stability/run.py, one table each, columns apart by tabs:
 !>
 !>     bench_stability limits | orders | tableaux | tolerances | configurations | samples | extremes | drift SCENE PERIODS METHOD...
+!>     bench_stability reference SCENE.nml STEPS TIME...   (for bench/work_precision/run.py)
 program bench_stability
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
    use rodyn_case_config, only: case_config
+   use rodyn_case_reader, only: read_case
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_frequencies, only: decay_rates, natural_frequencies
    use rodyn_accelerations, only: dynamics_type, new_dynamics
@@ -12,7 +14,7 @@ program bench_stability
    use rodyn_stability_function, only: stability_function, stability_function_of
    use rodyn_step_limit, only: largest_stable_step
    use rodyn_bench_campaign_runs, only: run_result, run_campaign_case, article_chain, empty_case
-   use rodyn_bench_quad_reference, only: qp, quad_accelerations, quad_motion, condition_number
+   use rodyn_bench_quad_reference, only: qp, quad_accelerations, quad_motion, condition_number, supported
    implicit none (type, external)
 
    character(len=1), parameter :: tab = achar(9)
@@ -31,8 +33,9 @@ program bench_stability
    case ('samples'); call samples()
    case ('extremes'); call extremes()
    case ('drift'); call drift()
+   case ('reference'); call print_reference()
    case default
-      error stop 'bench_stability limits | orders | tableaux | tolerances | configurations | samples | extremes | drift ...'
+      error stop 'bench_stability PART ...: see the head of its source'
    end select
 
 contains
@@ -76,6 +79,37 @@ contains
       call state_at_start(config, y, m)
       call quad_motion(config, t, steps, y(:m), y(m + 1:))
    end function reference
+
+   !> A scene in quadruple precision: a line for each of the times, chord angles and then slope rates alpha', apart by tabs.
+   !> STEPS is their number between two of the times.
+   subroutine print_reference()
+      type(case_config) :: config
+      type(error_type), allocatable :: error
+      real(qp), allocatable :: y(:)
+      character(len=256) :: word
+      real(wp) :: t, before
+      integer :: i, j, m, steps, base
+
+      call get_command_argument(2, word)
+      call read_case(trim(word), config, error=error)
+      if (allocated(error)) error stop 'the scene cannot be read'
+      if (.not. supported(config)) error stop 'this reference does not know such scenes'
+      call get_command_argument(3, word)
+      read (word, *) steps
+      call state_at_start(config, y, m)
+      base = merge(0, 3, config%spacecraft%motion == 'fixed')
+      before = 0.0_wp
+      do i = 4, command_argument_count()
+         call get_command_argument(i, word)
+         read (word, *) t
+         call quad_motion(config, t - before, steps, y(:m), y(m + 1:))
+         before = t
+         associate (n => config%chain%n_rods)
+            write (*, '(*(es41.32, :, a))') (y(base + j), tab, j=1, n), &
+               (y(m + base + n + j), tab, j=1, merge(n, 0, config%model%bending == 'dynamic'))
+         end associate
+      end do
+   end subroutine print_reference
 
    subroutine state_at_start(config, y, m)
       type(case_config), intent(in) :: config

@@ -58,6 +58,8 @@ AGREEMENT = 1e-9  # rad: what a peer must reach at its tightest to count as solv
 DOCUMENT = ROOT / "docs" / "work_precision.md"
 DOCUMENTED = ["table1", "rigid"]  # scenes whose pictures are in it
 MARK = "<!-- Below: written by bench/work_precision/run.py --docs -->"
+#: Scenes that bench/stability/quad_reference.f90 knows and can afford: its steps between two probe times.
+QUAD_STEPS = {"table1": 400, "rigid": 40}
 NO_SOLUTION = 10.0  # an error of phi beyond it is none
 
 
@@ -157,7 +159,7 @@ class Benchmark:
         self.budget = arguments.budget or min(6.0, max(0.5, share / 40))  # lines that are hopeless must leave time for the others
         self.tolerances = QUICK_TOLERANCES if self.quick else TOLERANCES
         python = ROOT / "bench" / "peers" / ".venv" / "bin" / "python"
-        self.workers = {"rodyn": Worker("rodyn", [build()])}
+        self.workers = {"rodyn": Worker("rodyn", [build("bench_work_precision")])}
         self.peers: dict[str, str] = {}  # version, or why it is absent
         self.results: dict[str, list[Computation]] = {}
         self.attributes: dict[str, dict[str, Any]] = {}
@@ -228,16 +230,17 @@ class Benchmark:
         say(f"{scene}: {sum(bool(c.seconds) for c in computations)} of {len(computations)} computations, {time.monotonic() - start:.0f} s")
 
     def reference(self, base: dict[str, Any]) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-        """Two methods that share nothing but the model where heyoka knows the scene, else two of Rodyn's. The first is the
-        reference, their difference what it is worth. References are kept beside the results, by the text of the scene."""
+        """Two methods that share nothing but the model where heyoka knows the scene, else two of Rodyn's; both in quadruple
+        precision where that can be afforded. The first is the reference, their difference what it is worth. References are kept beside the results, by the text of the scene."""
         text = pathlib.Path(base["scene"]).read_text()
         key = hashlib.sha256(json.dumps([text, base["probe_times"], sorted(self.workers)]).encode()).hexdigest()[:16]
-        kept = self.references / f"{pathlib.Path(base['scene']).stem}-{key}.json"
+        stem = pathlib.Path(base["scene"]).stem
+        kept = self.references / f"{stem}-{key}{'-quad' if stem in QUAD_STEPS else ''}.json"
         if kept.is_file():
             known = json.loads(kept.read_text())
             return {k: np.array(v) for k, v in known["reference"].items()}, known["said"]
         groups = read_namelist(text)
-        n, t_end, stem = groups["chain"][0]["n_rods"], groups["case"][0]["t_end"], pathlib.Path(base["scene"]).stem
+        n, t_end = groups["chain"][0]["n_rods"], groups["case"][0]["t_end"]
         quadruple = n <= 16 and t_end <= 30 and stem not in ("stiff", "damped")
         found: list[tuple[str, dict[str, np.ndarray]]] = []
         candidates = [("heyoka in quadruple precision, tolerance 1e-20", "heyoka" if quadruple else "", {"method": "reference", "rtol": 1e-20}),
@@ -245,6 +248,8 @@ class Benchmark:
                       ("dop853, rtol 1e-14", "rodyn", {"method": "dop853", "rtol": 1e-14, "atol": 1e-16}),
                       ("erk 8, rtol 1e-14", "rodyn", {"method": "erk", "order": 8, "rtol": 1e-14, "atol": 1e-16})]
         for name, worker, job in candidates:
+            if stem in QUAD_STEPS and len(found) == 1:
+                found.append(("other equations, extrapolated in quadruple precision", quad_reference(base, QUAD_STEPS[stem])))
             if len(found) == 2 or worker not in self.workers:
                 continue
             answer = self.workers[worker].ask(base | job | {"budget": 200.0, "repeats": 1}, 240.0)
@@ -537,15 +542,24 @@ def scene_path(scene: str) -> str:
     return str(HERE / f"{scene}.nml")
 
 
-def build() -> str:
-    """The Fortran worker; its path."""
+def build(example: str) -> str:
+    """Path of a compiled benchmark."""
     environment = os.environ | {"FPM_FC": os.environ.get("FPM_FC", "mpifort"), "PATH": f"{ROOT / '.venv' / 'bin'}:{os.environ['PATH']}"}
     flags = subprocess.run([ROOT / "tools" / "flags", "release"], capture_output=True, text=True, check=True).stdout.strip()
-    done = subprocess.run(["fpm", "run", "--example", "bench_work_precision", "--runner", "echo", "--flag", flags], cwd=ROOT, env=environment,
+    done = subprocess.run(["fpm", "run", "--example", example, "--runner", "echo", "--flag", flags], cwd=ROOT, env=environment,
                           capture_output=True, text=True, check=False)
     if done.returncode:
-        raise SystemExit(f"bench_work_precision could not be built:\n{done.stderr[-2000:]}")
+        raise SystemExit(f"{example} could not be built:\n{done.stderr[-2000:]}")
     return str(ROOT / done.stdout.split()[-1])
+
+
+def quad_reference(base: dict[str, Any], steps: int) -> dict[str, np.ndarray]:
+    """phi and alpha' (probe, rod) by inertial coordinates, Jacobians at Gauss points and an extrapolated midpoint rule."""
+    command = [build("bench_stability"), "reference", base["scene"], str(steps), *map(repr, base["probe_times"])]
+    text = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    values = np.array([[float(word) for word in line.split()] for line in text.splitlines()])
+    n = read_namelist(pathlib.Path(base["scene"]).read_text())["chain"][0]["n_rods"]
+    return {"phi": values[:, :n], "alpha_rate": values[:, n:]}
 
 
 def machine() -> str:
