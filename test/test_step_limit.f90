@@ -40,7 +40,7 @@ contains
          new_test('an oscillator stays below the limit of each method and grows above it', oscillator_limits), &
          new_test('an overdamped oscillator decays below the limit of each method and grows above it', damper_limits), &
          new_test('eigenvalues of random scenes at rest are their natural frequencies', undamped_eigenvalues), &
-         new_test('the fastest vibration and damper of a long chain, from below and to a hundredth', extreme_rates), &
+         new_test('the fastest vibration and damper in O(n), from below and to a hundredth', extreme_rates), &
          new_test('a scene keeps its energy below the limit of each method and explodes above it', scene_limits), &
          new_test('a refused step is named with a limit that is accepted', refusals), &
          new_test('steps that moving kinks make shorter are not refused', shortened_steps), &
@@ -203,28 +203,31 @@ contains
       type(scene_type) :: scene
       complex(wp), allocatable :: lambda(:, :)
       real(wp), allocatable :: frequency(:), decay(:), q(:)
-      integer :: which
+      integer, parameter :: rods(*) = [1, 2, 3, 6, 13, 40] ! fewer unknowns than steps, and more
+      integer :: which, j
 
       call seed_random(42)
-      do which = 1, n_kinds
-         call random_case(config, which, 40)
-         call new_scene(scene, config, error)
-         if (allocated(error)) return
-         if (scene%n_q > scene%n_dof) cycle
-         allocate (q(scene%n_q), source=0.0_wp)
-         q(scene%phi_at() + 1:scene%phi_at() + scene%n) = config%initial%phi
-         call natural_frequencies(scene, q, frequency, error)
-         if (allocated(error)) return
-         call extreme_eigenvalues(scene, q, lambda)
-         call check_from_below(abs(lambda(1, 1)), maxval(frequency), kind_name(which)//': frequency')
-         if (allocated(error)) return
-         if (scene%hinges%has_damping) then
-            call decay_rates(scene, q, decay, error)
+      do j = 1, size(rods)
+         do which = 1, n_kinds
+            call random_case(config, which, rods(j))
+            call new_scene(scene, config, error)
             if (allocated(error)) return
-            call check_from_below(abs(lambda(1, 2)), maxval(decay), kind_name(which)//': decay')
+            if (scene%n_q > scene%n_dof) cycle
+            allocate (q(scene%n_q), source=0.0_wp)
+            q(scene%phi_at() + 1:scene%phi_at() + scene%n) = config%initial%phi
+            call natural_frequencies(scene, q, frequency, error)
             if (allocated(error)) return
-         end if
-         deallocate (q)
+            call extreme_eigenvalues(scene, q, lambda)
+            call check_from_below(abs(lambda(1, 1)), maxval(frequency), kind_name(which)//': frequency')
+            if (allocated(error)) return
+            if (scene%hinges%has_damping) then
+               call decay_rates(scene, q, decay, error)
+               if (allocated(error)) return
+               call check_from_below(abs(lambda(1, 2)), maxval(decay), kind_name(which)//': decay')
+               if (allocated(error)) return
+            end if
+            deallocate (q)
+         end do
       end do
 
    contains

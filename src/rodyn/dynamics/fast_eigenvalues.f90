@@ -149,7 +149,7 @@ contains
       do i = 1, n_iterations
          call forces_of(dynamics, q, which, v, force)
          beside(i) = sqrt(max(0.0_wp, dot_product(v, force)))
-         if (.not. beside(i) > sqrt(tiny(1.0_wp)) .or. beside(i) < 1.0e-7_wp*norm) exit ! an invariant subspace
+         if (.not. beside(i) > sqrt(tiny(1.0_wp)) .or. beside(i) < 1.0e-4_wp*norm) exit ! an invariant subspace, or nearly
          v = v/beside(i)
          force = force/beside(i)
          call rates_of(dynamics, q, which, v, next, ok)
@@ -159,7 +159,11 @@ contains
          if (i > 1) next = next - beside(i)*before
          before = v
          v = next - diagonal(i)*v
-         if (which == dampers) call drop_undamped(dynamics%scene, v)
+         if (which == dampers) then
+            call drop_undamped(dynamics%scene, v)
+         else
+            call drop_unsprung(dynamics%scene, v)
+         end if
       end do
       if (i > 1) greatest_rate = largest_of(diagonal(:i - 1), beside(2:i - 1))
    end function greatest_rate
@@ -180,6 +184,22 @@ contains
          x(scene%phi_at() + 1:scene%phi_at() + scene%n) = [(sum(opening(:k)), k=1, scene%n)]
       end if
    end subroutine drop_undamped
+
+   !> Springs see neither the motion of the spacecraft nor the openings of hinges that have none. The same of x is put to rest.
+   subroutine drop_unsprung(scene, x)
+      type(scene_type), intent(in) :: scene
+      real(wp), intent(inout) :: x(:) !! (n_dof)
+      real(wp) :: opening(0:scene%n - 1), turned
+      integer :: k
+
+      x(:scene%n_base) = 0.0_wp
+      call openings(scene%n, scene%dynamic_bending, x(scene%phi_at() + 1:), opening)
+      turned = 0.0_wp
+      do k = 1, scene%n
+         if (.not. scene%hinges%stiffness(k - 1) > 0.0_wp) turned = turned + opening(k - 1)
+         x(scene%phi_at() + k) = x(scene%phi_at() + k) - turned
+      end do
+   end subroutine drop_unsprung
 
    !> K x or D x, exactly.
    subroutine forces_of(dynamics, q, which, x, force)
