@@ -42,7 +42,7 @@ contains
       end do
    end subroutine test_agreement
 
-   !> gamma times the highest frequency up to 1e6. Of 10800 such scenes the worst is 1.7e-10.
+   !> gamma times the highest frequency up to 1e6. Of 21600 such scenes the worst is 1.7e-10.
    subroutine test_stiff(error)
       type(error_type), allocatable, intent(out) :: error
       call compare_stiff(.false., 1.0e-8_wp, error)

@@ -5,7 +5,7 @@ module test_quadrature
    use rodyn_quadrature, only: gauss_rule, new_gauss_rule
    use rodyn_rod_integrals, only: rod_integrals, new_rod_integrals
    use rodyn_trigonometry, only: sine_cosine
-   use test_random_scenes, only: uniform
+   use test_random_scenes, only: seed_random, uniform
    use test_testing, only: unittest, new_test, check, check_close
    implicit none (type, external)
    private
@@ -106,6 +106,7 @@ contains
       real(wp), parameter :: pi = acos(-1.0_wp)
       integer :: i, k
 
+      call seed_random(1)
       do k = 0, 8
          x = [(uniform(-1.0_wp, 1.0_wp), i=1, n)]*min(4.9e5_wp, 0.7_wp*6.0_wp**k)
          x(1:100) = [(0.5_wp*pi*(i - 50), i=1, 100)]

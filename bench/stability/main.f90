@@ -86,7 +86,7 @@ contains
       type(case_config) :: config
       type(error_type), allocatable :: error
       real(qp), allocatable :: y(:)
-      character(len=256) :: word
+      character(len=4096) :: word
       real(wp) :: t, before
       integer :: i, j, m, steps, base
 

@@ -231,7 +231,8 @@ class Benchmark:
 
     def reference(self, base: dict[str, Any]) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         """Two methods that share nothing but the model where heyoka knows the scene, else two of Rodyn's; both in quadruple
-        precision where that can be afforded. The first is the reference, their difference what it is worth. References are kept beside the results, by the text of the scene."""
+        precision where that can be afforded. The first is the reference, their difference what it is worth. References are kept
+        beside the results, by the text of the scene."""
         text = pathlib.Path(base["scene"]).read_text()
         key = hashlib.sha256(json.dumps([text, base["probe_times"], sorted(self.workers)]).encode()).hexdigest()[:16]
         stem = pathlib.Path(base["scene"]).stem
@@ -245,12 +246,15 @@ class Benchmark:
         found: list[tuple[str, dict[str, np.ndarray]]] = []
         candidates = [("heyoka in quadruple precision, tolerance 1e-20", "heyoka" if quadruple else "", {"method": "reference", "rtol": 1e-20}),
                       ("heyoka, tolerance 2.3e-16", "heyoka" if not quadruple and n <= 64 else "", {"method": "heyoka", "rtol": 2.3e-16}),
+                      ("other equations, extrapolated in quadruple precision", "quad" if stem in QUAD_STEPS else "", {}),
                       ("dop853, rtol 1e-14", "rodyn", {"method": "dop853", "rtol": 1e-14, "atol": 1e-16}),
                       ("erk 8, rtol 1e-14", "rodyn", {"method": "erk", "order": 8, "rtol": 1e-14, "atol": 1e-16})]
         for name, worker, job in candidates:
-            if stem in QUAD_STEPS and len(found) == 1:
-                found.append(("other equations, extrapolated in quadruple precision", quad_reference(base, QUAD_STEPS[stem])))
-            if len(found) == 2 or worker not in self.workers:
+            if len(found) == 2:
+                break
+            if worker == "quad":
+                found.append((name, quad_reference(base, QUAD_STEPS[stem])))
+            if worker not in self.workers:
                 continue
             answer = self.workers[worker].ask(base | job | {"budget": 200.0, "repeats": 1}, 240.0)
             if answer["status"] == "done":

@@ -13,11 +13,11 @@ contains
       real(wp), contiguous, intent(in) :: h(:, :) !! symmetric
       integer, intent(in) :: i, j                 !! h(i, j) is not zero
       real(wp), intent(out) :: c, s
-      real(wp) :: theta, size, t
+      real(wp) :: theta, large, t
 
       theta = 0.5_wp*(h(j, j) - h(i, i))/h(i, j)
-      size = min(abs(theta), 1.0e100_wp) ! its square is a number, and the angle beyond is none
-      t = sign(1.0_wp, theta)/(size + sqrt(1.0_wp + size**2))
+      large = min(abs(theta), 1.0e100_wp) ! its square is a number, and the angle beyond is none
+      t = sign(1.0_wp, theta)/(large + sqrt(1.0_wp + large**2))
       c = 1.0_wp/sqrt(1.0_wp + t**2)
       s = t*c
    end subroutine jacobi_rotation

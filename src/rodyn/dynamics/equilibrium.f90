@@ -320,8 +320,8 @@ contains
       real(wp) :: rate(size(y)), jac(size(y), size(y))
       logical :: ok
 
-      call motion%jacobian(t, y, jac, ok)
-      if (ok) call motion%rhs(t, y, rate, ok)
+      call motion%rhs(t, y, rate, ok)
+      if (ok) call motion%jacobian(t, y, jac, ok)
       associate (r => motion%n_q, m => motion%n_dof, spin_rate => rate(motion%n_q + 3))
          ! The derivatives of the accelerations tell of their rounding errors.
          if (ok) ok = abs(spin_rate) <= 1.0e3_wp*epsilon(1.0_wp)*max(1.0_wp, maxval(abs(jac(r + 3:r + m, :))))

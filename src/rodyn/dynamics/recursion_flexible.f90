@@ -26,9 +26,8 @@ module rodyn_recursion_flexible
    public :: flexible_accelerations
 
    ! Places in `outward` (`rodyn_outward`).
-   integer, parameter :: of_turn = 1, of_along = 3, of_cross = 5, &
-                         of_alpha = 7, of_beta = 9, of_pull = 11, of_cosine = 13, of_sine = 15, of_down = 17, &
-                         of_kept = 19
+   integer, parameter :: of_turn = 1, of_along = 3, of_cross = 5, of_alpha = 7, of_beta = 9, of_pull = 11, of_cosine = 13, &
+                         of_sine = 15, of_down = 17, of_kept = 19
 
 contains
 

@@ -13,8 +13,8 @@ module rodyn_recursion_rigid
    public :: rigid_accelerations
 
    ! Places in `outward` (`rodyn_outward`).
-   integer, parameter :: of_turn = 1, of_along = 3, of_cross = 5, &
-                         of_pull = 7, of_cosine = 9, of_sine = 11, of_down = 13, of_kept = 15
+   integer, parameter :: of_turn = 1, of_along = 3, of_cross = 5, of_pull = 7, of_cosine = 9, of_sine = 11, &
+                         of_down = 13, of_kept = 15
 
 contains
 

@@ -114,6 +114,7 @@ contains
       done = 1.0_wp
       if (t_end > t_start) done = min(1.0_wp, max(0.0_wp, (t - t_start)/(t_end - t_start)))
       write (steps, '(i0)') n_steps
+      ! The time keeps its zeros, so that the line does not dance.
       line = 't = '//formatted(t, '(g16.6)')//' of '//time_text(t_end)//' s, '//formatted(100.0_wp*done, '(f8.1)')//' %, ' &
          //trim(steps)//' steps, '
       if (done > 0.0_wp) then
