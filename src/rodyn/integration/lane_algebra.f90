@@ -12,7 +12,7 @@ module rodyn_lane_algebra
 
 contains
 
-   !> y(:, j) = y(:, j) + A x(:, j).
+   !> y(:, j) = y(:, j) + A x(:, j). Without the inner loop A stays in registers while x and y go by.
    pure subroutine apply(n, a, x, y)
       integer, intent(in) :: n
       real(wp), intent(in) :: a(s, s), x(s, n)
@@ -23,6 +23,7 @@ contains
          y_1 = y(:, j)
          y_2 = y(:, j + 1)
          y_3 = y(:, j + 2)
+         !GCC$ unroll 8
          do i = 1, s
             !$omp simd
             do l = 1, s
@@ -64,7 +65,7 @@ contains
       y = sum_1 + sum_2
    end subroutine apply_one
 
-   !> y(:, j) = y(:, j) + A x(:, j) and z(:, j) = z(:, j) + B x(:, j).
+   !> y(:, j) = y(:, j) + A x(:, j) and z(:, j) = z(:, j) + B x(:, j), likewise.
    pure subroutine apply_both(n, a, b, x, y, z)
       integer, intent(in) :: n
       real(wp), intent(in) :: a(s, s), b(s, s), x(s, n)
@@ -78,6 +79,7 @@ contains
          z_1 = z(:, j)
          z_2 = z(:, j + 1)
          z_3 = z(:, j + 2)
+         !GCC$ unroll 8
          do i = 1, s
             !$omp simd
             do l = 1, s
@@ -107,39 +109,8 @@ contains
       integer, intent(in) :: n, m
       real(wp), intent(in) :: v(n, m), x(s, n)
       real(wp), intent(out) :: z(s, m)
-      real(wp), dimension(s) :: sum_1, sum_2, sum_3, sum_4
-      integer :: i, j, l, single
-
-      single = mod(m, 4)
-      do i = 1, single
-         sum_1 = 0.0_wp
-         do j = 1, n
-            !$omp simd
-            do l = 1, s
-               sum_1(l) = sum_1(l) + v(j, i)*x(l, j)
-            end do
-         end do
-         z(:, i) = sum_1
-      end do
-      do i = single + 1, m, 4
-         sum_1 = 0.0_wp
-         sum_2 = 0.0_wp
-         sum_3 = 0.0_wp
-         sum_4 = 0.0_wp
-         do j = 1, n
-            !$omp simd
-            do l = 1, s
-               sum_1(l) = sum_1(l) + v(j, i)*x(l, j)
-               sum_2(l) = sum_2(l) + v(j, i + 1)*x(l, j)
-               sum_3(l) = sum_3(l) + v(j, i + 2)*x(l, j)
-               sum_4(l) = sum_4(l) + v(j, i + 3)*x(l, j)
-            end do
-         end do
-         z(:, i) = sum_1
-         z(:, i + 1) = sum_2
-         z(:, i + 2) = sum_3
-         z(:, i + 3) = sum_4
-      end do
+      z = 0.0_wp
+      call expand(m, n, v, x, z)
    end subroutine project
 
    !> f_i = sum_j v(j, i) x_j and g_i = sum_j v(j, i) y_j: no lanes, but eight sums at a time, none of which waits for another.
@@ -169,39 +140,34 @@ contains
       end do
    end subroutine project_pair
 
-   !> x(:, j) = x(:, j) + sum_i u(i, j) z(:, i).
+   !> x(:, j) = x(:, j) + sum_i u(i, j) z(:, i). Four columns of z stay in registers while x goes by.
    pure subroutine expand(n, m, u, z, x)
       integer, intent(in) :: n, m
       real(wp), intent(in) :: u(m, n), z(s, m)
       real(wp), intent(inout) :: x(s, n)
-      real(wp), dimension(s) :: sum_1, sum_2, sum_3
+      real(wp), dimension(s) :: z_1, z_2, z_3, z_4
       integer :: i, j, l
 
-      do j = 1, n - 2, 3
-         sum_1 = x(:, j)
-         sum_2 = x(:, j + 1)
-         sum_3 = x(:, j + 2)
-         do i = 1, m
+      do i = 1, m - 3, 4
+         z_1 = z(:, i)
+         z_2 = z(:, i + 1)
+         z_3 = z(:, i + 2)
+         z_4 = z(:, i + 3)
+         do j = 1, n
             !$omp simd
             do l = 1, s
-               sum_1(l) = sum_1(l) + u(i, j)*z(l, i)
-               sum_2(l) = sum_2(l) + u(i, j + 1)*z(l, i)
-               sum_3(l) = sum_3(l) + u(i, j + 2)*z(l, i)
+               x(l, j) = x(l, j) + u(i, j)*z_1(l) + u(i + 1, j)*z_2(l) + u(i + 2, j)*z_3(l) + u(i + 3, j)*z_4(l)
             end do
          end do
-         x(:, j) = sum_1
-         x(:, j + 1) = sum_2
-         x(:, j + 2) = sum_3
       end do
-      do j = n - modulo(n, 3) + 1, n
-         sum_1 = x(:, j)
-         do i = 1, m
+      do i = m - modulo(m, 4) + 1, m
+         z_1 = z(:, i)
+         do j = 1, n
             !$omp simd
             do l = 1, s
-               sum_1(l) = sum_1(l) + u(i, j)*z(l, i)
+               x(l, j) = x(l, j) + u(i, j)*z_1(l)
             end do
          end do
-         x(:, j) = sum_1
       end do
    end subroutine expand
 
@@ -250,9 +216,12 @@ contains
       integer, intent(in) :: n
       real(wp), intent(in) :: q(n), p(n), h, c(s)
       real(wp), intent(out) :: x(s, n)
-      integer :: j
+      integer :: j, l
       do j = 1, n
-         x(:, j) = q(j) + (h*p(j))*c
+         !$omp simd
+         do l = 1, s
+            x(l, j) = q(j) + (h*p(j))*c(l)
+         end do
       end do
    end subroutine straight_lines
 
