@@ -1,21 +1,20 @@
-!> Jacobi's rotations, which make elements of a symmetric matrix zero one by one (Golub & Van Loan, Matrix Computations,
-!> sec. 8.5).
+!> Jacobi's rotations, which make elements of a symmetric matrix zero, or columns of any matrix orthogonal, one by one (Golub &
+!> Van Loan, Matrix Computations, sec. 8.5 and 8.6.3).
 module rodyn_jacobi_rotation
    use rodyn_kinds, only: wp
    implicit none (type, external)
    private
-   public :: jacobi_rotation, rotate_columns, rotate_rows
+   public :: jacobi_rotation, rotate_columns, rotate_rows, orthogonalise_columns
 
 contains
 
-   !> Cosine and sine of the smaller rotation of rows and columns i and j after which h(i, j) is zero.
-   pure subroutine jacobi_rotation(h, i, j, c, s)
-      real(wp), contiguous, intent(in) :: h(:, :) !! symmetric
-      integer, intent(in) :: i, j                 !! h(i, j) is not zero
+   !> Cosine and sine of the smaller rotation of rows and columns i and j of a symmetric matrix after which h_ij is zero.
+   pure subroutine jacobi_rotation(h_ii, h_jj, h_ij, c, s)
+      real(wp), intent(in) :: h_ii, h_jj, h_ij !! h_ij is not zero
       real(wp), intent(out) :: c, s
       real(wp) :: theta, large, t
 
-      theta = 0.5_wp*(h(j, j) - h(i, i))/h(i, j)
+      theta = 0.5_wp*(h_jj - h_ii)/h_ij
       large = min(abs(theta), 1.0e100_wp) ! its square is a number, and the angle beyond is none
       t = sign(1.0_wp, theta)/(large + sqrt(1.0_wp + large**2))
       c = 1.0_wp/sqrt(1.0_wp + t**2)
@@ -29,6 +28,7 @@ contains
       real(wp), intent(in) :: c, s
       real(wp) :: before
       integer :: k
+      !$omp simd private(before)
       do k = 1, size(x, 1)
          before = x(k, i)
          x(k, i) = c*before - s*x(k, j)
@@ -49,5 +49,51 @@ contains
          x(j, k) = s*before + c*x(j, k)
       end do
    end subroutine rotate_rows
+
+   !> Rotate columns of x until the parts b_i in its first m rows are (nearly) orthogonal, all other rows along with them.
+   pure subroutine orthogonalise_columns(x, m, smallest, negligible, squares)
+      real(wp), contiguous, intent(inout) :: x(:, :)
+      integer, intent(in) :: m
+      real(wp), intent(in) :: smallest     !! columns with a smaller square need no precision
+      real(wp), intent(in) :: negligible   !! b_i.b_j, of the smaller square
+      real(wp), intent(out) :: squares(:)  !! |b_i|^2 (columns)
+      integer, parameter :: most_sweeps = 12
+      real(wp) :: product_ij, c, s
+      integer :: sweep, i, j
+      logical :: done
+
+      do sweep = 1, most_sweeps
+         do i = 1, size(x, 2)
+            squares(i) = inner_product(m, x(:, i), x(:, i))
+         end do
+         done = .true.
+         do j = 2, size(x, 2)
+            do i = 1, j - 1
+               product_ij = inner_product(m, x(:, i), x(:, j))
+               if (abs(product_ij) <= negligible*max(smallest, min(squares(i), squares(j)))) cycle
+               done = .false.
+               call jacobi_rotation(squares(i), squares(j), product_ij, c, s)
+               call rotate_columns(x, i, j, c, s)
+               squares(i) = squares(i) - s/c*product_ij
+               squares(j) = squares(j) + s/c*product_ij
+            end do
+         end do
+         if (done) return
+      end do
+   end subroutine orthogonalise_columns
+
+   !> Sum of x_k y_k, in vectors.
+   pure real(wp) function inner_product(m, x, y)
+      integer, intent(in) :: m
+      real(wp), intent(in) :: x(m), y(m)
+      real(wp) :: total
+      integer :: k
+      total = 0.0_wp
+      !$omp simd reduction(+:total)
+      do k = 1, m
+         total = total + x(k)*y(k)
+      end do
+      inner_product = total
+   end function inner_product
 
 end module rodyn_jacobi_rotation

@@ -7,7 +7,7 @@ module rodyn_lapack
    implicit none (type, external)
    private
    public :: use_one_thread, symmetric_eigenvalues
-   public :: dpotrf, dpotrs, dgesv, dgetrf, dgetrs, dsyev, dgeev, dgemv, dgemm
+   public :: dpotrf, dpotrs, dgesv, dgetrf, dgetrs, dsyev, dgeev, dgemv, dgemm, dtrsm
 
    interface
       !> Cholesky factors of a symmetric positive definite matrix.
@@ -30,6 +30,16 @@ module rodyn_lapack
          real(wp), intent(inout) :: b(ldb, *)
          integer, intent(out) :: info
       end subroutine dpotrs
+
+      !> Solve a triangular system for many right-hand sides.
+      pure subroutine dtrsm(side, uplo, transa, diag, m, n, alpha, a, lda, b, ldb)
+         import :: wp
+         implicit none (type, external)
+         character(len=1), intent(in) :: side, uplo, transa, diag
+         integer, intent(in) :: m, n, lda, ldb
+         real(wp), intent(in) :: alpha, a(lda, *)
+         real(wp), intent(inout) :: b(ldb, *)
+      end subroutine dtrsm
 
       !> Solve a general system by LU with pivoting.
       pure subroutine dgesv(n, nrhs, a, lda, ipiv, b, ldb, info)

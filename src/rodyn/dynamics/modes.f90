@@ -192,7 +192,7 @@ contains
                if (abs(h(i, j)) <= negligible*sqrt(abs(h(i, i)))*sqrt(abs(h(j, j)))) cycle
                if (abs(h(i, j)) <= tiny(1.0_wp)) cycle
                done = .false.
-               call jacobi_rotation(h, i, j, c, s)
+               call jacobi_rotation(h(i, i), h(j, j), h(i, j), c, s)
                call rotate_columns(h, i, j, c, s)
                call rotate_rows(h, i, j, c, s)
                call rotate_columns(basis, i, j, c, s)
