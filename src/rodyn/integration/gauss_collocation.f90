@@ -90,23 +90,27 @@ contains
       end do
    end subroutine decompose
 
-   !> Matrix that takes node values of one step to values at x_i = start + length c_i, in units of that step.
-   pure function interpolation(self, start, length) result(matrix)
+   !> Matrix that takes node values of one step to values at x_i = start + length c_i, in units of that step, of the
+   !> polynomial through them or of its part up to `degree`.
+   pure function interpolation(self, start, length, degree) result(matrix)
       class(gauss_collocation), intent(in) :: self
       real(wp), intent(in) :: start, length
+      integer, intent(in), optional :: degree !! < s; absent: s - 1
       real(wp) :: matrix(s, s)
       real(wp) :: p(s, 0:s - 1), x(s)
-      integer :: j, k
+      integer :: j, k, last
 
+      last = s - 1
+      if (present(degree)) last = degree
       x = 2.0_wp*(start + length*self%c) - 1.0_wp
       p(:, 0) = 1.0_wp
       p(:, 1) = x
-      do k = 2, s - 1
+      do k = 2, last
          p(:, k) = ((2*k - 1)*x*p(:, k - 1) - (k - 1)*p(:, k - 2))*(1.0_wp/k)
       end do
       do j = 1, s
          matrix(:, j) = self%coefficients(1, j)
-         do k = 1, s - 1
+         do k = 1, last
             matrix(:, j) = matrix(:, j) + self%coefficients(k + 1, j)*p(:, k)
          end do
       end do

@@ -28,11 +28,13 @@ module rodyn_gauss_integrator
    public :: gauss_integrator, new_gauss_integrator
 
    integer, parameter :: most_iterations = 15
-   real(wp), parameter :: iteration_error = 0.05_wp !! of the tolerance that the iteration may leave
+   real(wp), parameter :: iteration_error = 0.1_wp  !! of the tolerance that the iteration may leave
    real(wp), parameter :: error_constant = 0.5_wp   !! of the error estimate, see `error_estimate`
-   real(wp), parameter :: wanted_estimate = 0.3_wp, largest_estimate = 4.0_wp !! of the error, in tolerances
+   real(wp), parameter :: wanted_estimate = 0.05_wp, largest_estimate = 0.7_wp !! of the error, in tolerances
    real(wp), parameter :: first_phase = 2.0_wp      !! fastest frequency times the first step
    real(wp), parameter :: smallest_phase = 0.4_wp  !! slower vibrations need no implicit treatment
+   integer, parameter :: degrees(*) = [2, s - 1]   !! of the first guess
+   integer, parameter :: degree_interval = 8       !! steps after which the degree is judged again
    real(wp), parameter :: search_cost = 1.5_wp      !! finding modes, in iterations per unknown
 
    ! The numbers of the method, made once: a sweep has thousands of integrators.
@@ -81,6 +83,7 @@ module rodyn_gauss_integrator
       integer :: iterations = 0, fewest = most_iterations !! of the last step; of any since the modes were found
       real(wp) :: estimate = 0.0_wp          !! of the error, mean of the last steps; 0: none
       real(wp) :: excess = 0.0_wp            !! iterations lost since then
+      integer :: degree = s - 1              !! of the first guess
       logical :: has_history = .false.       !! `last` may be extrapolated
       logical :: refused = .false.           !! the last failure came from the equations
       type(solver_statistics) :: counts
@@ -274,6 +277,7 @@ contains
             self%h = 0.4_wp*h
          end if
       end do
+      if (modulo(self%n_steps, degree_interval) == 0) call choose_degree(self)
       call accept(self, h, t_new)
       self%excess = self%excess + real(self%iterations - self%fewest, wp)
       self%fewest = min(self%fewest, self%iterations)
@@ -406,7 +410,7 @@ contains
       end if
       if (self%now%h_last /= self%last%h) then
          self%now%h_last = self%last%h
-         self%now%ahead = self%rule%interpolation(1.0_wp, self%now%h/self%last%h)
+         self%now%ahead = self%rule%interpolation(1.0_wp, self%now%h/self%last%h, self%degree)
       end if
       call multiply(m, self%now%ahead, self%last%smooth, self%trial%smooth)
       associate (modes => self%modes)
@@ -424,6 +428,26 @@ contains
          call expand(m, modes%n, modes%u, self%reply, self%trial%f)
       end associate
    end subroutine predict
+
+   !> Whether the smooth part is better extrapolated with low or full degree, seen from the step just done. What fast vibrations
+   !> leave in it is large in all its coefficients, and polynomials of high degree enlarge that outside their step. The measure
+   !> is what the error of the guess does to Q, A^2 dN.
+   subroutine choose_degree(self)
+      class(gauss_integrator), intent(inout) :: self
+      real(wp) :: errors(size(degrees))
+      integer :: i, m
+
+      m = self%mechanics%n_dof
+      do i = 1, size(degrees)
+         call multiply(m, matmul(self%rule%a2, self%rule%interpolation(1.0_wp, self%now%h/self%last%h, degrees(i))), &
+                       self%last%smooth, self%guess)
+         call apply(m, -self%rule%a2, self%trial%smooth, self%guess)
+         errors(i) = sum(square_sums(m, self%guess, self%weight))
+      end do
+      i = minloc(errors, dim=1)
+      if (degrees(i) /= self%degree) self%now%h_last = 0.0_wp
+      self%degree = degrees(i)
+   end subroutine choose_degree
 
    !> Before the first step: the smooth part is taken to be constant.
    subroutine begin_history(self, ok)
