@@ -16,11 +16,12 @@ module rodyn_lanes_bench
    use rodyn_simulation, only: observer_type, listed_times, simulate
    implicit none (type, external)
    private
-   public :: kernels, cases
+   public :: kernels, cases, peak
 
    integer, parameter :: n_rounds = 31
    integer, parameter :: n_cases = 64
    integer, parameter :: case_rounds = 7
+   integer, parameter :: n_streams = 10, stream_length = 20000 !! of multiply-adds, none of which waits for another
 
    !> One measured scene.
    type :: subject
@@ -207,6 +208,95 @@ contains
       associate (unused => self, unused_motion => motion, unused_t => t, unused_y => y, unused_error => error); end associate
    end subroutine look_away
 
+   !> The most that lanes can bring where both sides are bound by arithmetic: multiply-adds, a number or a vector at a time.
+   subroutine peak()
+      real(wp) :: x(n_streams), y(lanes, n_streams), one(n_rounds), many(n_rounds)
+      integer(i8) :: start, middle, finish, rate
+      integer :: round
+
+      call random_number(x)
+      call random_number(y)
+      do round = 1, n_rounds
+         call system_clock(start, rate)
+         call stream_numbers(x)
+         call system_clock(middle)
+         call stream_vectors(y)
+         call system_clock(finish)
+         one(round) = 1.0e9_wp*real(middle - start, wp)/real(rate, wp)/(n_streams*stream_length)
+         many(round) = 1.0e9_wp*real(finish - middle, wp)/real(rate, wp)/(n_streams*stream_length*lanes)
+      end do
+      if (any(x > 2.0_wp) .or. any(y > 2.0_wp)) error stop 'multiply-adds went wrong'
+      write (*, '(/, a, 2(f7.4, a), f5.2)') 'multiply-add: ', median(one), ' ns, in lanes ', median(many), ' ns, ratio ', &
+         median(one/many)
+   end subroutine peak
+
+   !> x = a x + b in each stream; scalars by name, since compilers make vectors of arrays.
+   subroutine stream_numbers(x)
+      real(wp), intent(inout) :: x(n_streams)
+      real(wp), parameter :: a = 0.5_wp, b = 0.3_wp
+      real(wp) :: x1, x2, x3, x4, x5, x6, x7, x8, x9, x10
+      integer :: i
+
+      x1 = x(1)
+      x2 = x(4)
+      x3 = x(7)
+      x4 = x(10)
+      x5 = x(3)
+      x6 = x(6)
+      x7 = x(9)
+      x8 = x(2)
+      x9 = x(5)
+      x10 = x(8)
+      do i = 1, stream_length
+         x1 = a*x1 + b
+         x2 = a*x2 + b
+         x3 = a*x3 + b
+         x4 = a*x4 + b
+         x5 = a*x5 + b
+         x6 = a*x6 + b
+         x7 = a*x7 + b
+         x8 = a*x8 + b
+         x9 = a*x9 + b
+         x10 = a*x10 + b
+      end do
+      x(1) = 0.1_wp*(x1 + x2 + x3 + x4 + x5 + x6 + x7 + x8 + x9 + x10)
+   end subroutine stream_numbers
+
+   !> The same in all lanes.
+   subroutine stream_vectors(x)
+      real(wp), intent(inout) :: x(lanes, n_streams)
+      real(wp), parameter :: a = 0.5_wp, b = 0.3_wp
+      real(wp), dimension(lanes) :: x1, x2, x3, x4, x5, x6, x7, x8, x9, x10
+      integer :: i, l
+
+      x1 = x(:, 1)
+      x2 = x(:, 4)
+      x3 = x(:, 7)
+      x4 = x(:, 10)
+      x5 = x(:, 3)
+      x6 = x(:, 6)
+      x7 = x(:, 9)
+      x8 = x(:, 2)
+      x9 = x(:, 5)
+      x10 = x(:, 8)
+      do i = 1, stream_length
+         !$omp simd
+         do l = 1, lanes
+            x1(l) = a*x1(l) + b
+            x2(l) = a*x2(l) + b
+            x3(l) = a*x3(l) + b
+            x4(l) = a*x4(l) + b
+            x5(l) = a*x5(l) + b
+            x6(l) = a*x6(l) + b
+            x7(l) = a*x7(l) + b
+            x8(l) = a*x8(l) + b
+            x9(l) = a*x9(l) + b
+            x10(l) = a*x10(l) + b
+         end do
+      end do
+      x(:, 1) = 0.1_wp*(x1 + x2 + x3 + x4 + x5 + x6 + x7 + x8 + x9 + x10)
+   end subroutine stream_vectors
+
    !> Time of a right-hand side.
    subroutine kernels()
       type(subject), allocatable :: subjects(:)
@@ -346,9 +436,10 @@ end module rodyn_lanes_bench
 
 program bench_lanes
    use, intrinsic :: iso_fortran_env, only: compiler_options
-   use rodyn_lanes_bench, only: kernels, cases
+   use rodyn_lanes_bench, only: kernels, cases, peak
    implicit none (type, external)
    write (*, '(2a)') 'compiler options: ', compiler_options()
    call kernels()
    call cases()
+   call peak()
 end program bench_lanes

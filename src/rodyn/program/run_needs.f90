@@ -63,11 +63,11 @@ contains
       type(case_config), intent(in) :: config
       select case (config%solver%method)
       case ('gauss')
-         bytes_per_rod = 4000.0_wp
+         bytes_per_rod = 4400.0_wp
       case ('bdf')
-         bytes_per_rod = 1900.0_wp
+         bytes_per_rod = 2200.0_wp
       case default
-         bytes_per_rod = 1500.0_wp
+         bytes_per_rod = 1800.0_wp
       end select
       if (config%model%bending /= 'dynamic') bytes_per_rod = 0.4_wp*bytes_per_rod
    end function bytes_per_rod
