@@ -208,8 +208,7 @@ contains
       logical, intent(out) :: ok
       associate (unused => q, unused_slowest => slowest); end associate
       modes%n = 0
-      if (.not. allocated(modes%omega_2)) &
-         allocate (modes%omega_2(0), modes%damping(0), modes%u(0, self%n_dof), modes%v(self%n_dof, 0))
+      call modes%reserve(0, self%n_dof, 0)
       ok = .true.
    end subroutine find_modes
 

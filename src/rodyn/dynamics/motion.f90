@@ -199,7 +199,10 @@ contains
       end if
       ok = .true.
       modes%n = 0
-      if (.not. self%modes%available) return
+      if (.not. self%modes%available) then
+         call modes%reserve(0, self%n_dof, self%n_ignorable)
+         return
+      end if
       associate (scene => self%dynamics%scene, work => self%dynamics%work)
          call sine_cosine(scene%n, q(scene%n_base + 1:scene%n_base + scene%n), work%sine(1:), work%cosine(1:))
          call self%modes%find(scene, work%sine, work%cosine, q, slowest, modes, ok)

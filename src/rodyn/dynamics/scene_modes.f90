@@ -91,11 +91,7 @@ contains
          end do
       end if
       modes%n = count(self%omega_2 > max(slowest**2, 1.0e-12_wp*maxval(self%omega_2)))
-      if (allocated(modes%omega_2)) then
-         if (size(modes%omega_2) /= modes%n) deallocate (modes%omega_2, modes%damping, modes%u, modes%v)
-      end if
-      if (.not. allocated(modes%omega_2)) allocate (modes%omega_2(modes%n), modes%damping(modes%n), modes%u(modes%n, m), &
-                                                    modes%v(m - scene%n_base, modes%n))
+      call modes%reserve(rank, m, scene%n_base)
       j = 0
       do i = 1, rank
          if (.not. self%omega_2(i) > max(slowest**2, 1.0e-12_wp*maxval(self%omega_2))) cycle

@@ -34,7 +34,7 @@ module rodyn_gauss_integrator
    real(wp), parameter :: first_phase = 2.0_wp      !! fastest frequency times the first step
    real(wp), parameter :: smallest_phase = 0.4_wp  !! slower vibrations need no implicit treatment
    integer, parameter :: degrees(*) = [2, s - 1]   !! of the first guess
-   integer, parameter :: degree_interval = 8       !! steps after which the degree is judged again
+   integer, parameter :: degree_interval = 16      !! steps after which the degree is judged again
    real(wp), parameter :: search_cost = 1.5_wp      !! finding modes, in iterations per unknown
 
    ! The numbers of the method, made once: a sweep has thousands of integrators.
@@ -171,7 +171,7 @@ contains
             return
          end if
          fastest = 0.0_wp
-         if (self%modes%n > 0) fastest = sqrt(maxval(self%modes%omega_2))
+         if (self%modes%n > 0) fastest = sqrt(maxval(self%modes%omega_2(:self%modes%n)))
          self%h = span
          if (fastest*span > first_phase) self%h = first_phase/fastest
          if (self%modes%n == 0) self%h = 1.0e-3_wp*span
@@ -348,14 +348,13 @@ contains
       self%fewest = most_iterations
       self%now%h = 0.0_wp
       self%spare%h = 0.0_wp
-      if (allocated(self%modal)) then
-         if (size(self%modal, 2) /= self%modes%n) deallocate (self%modal, self%reply, self%stiff, self%rest, self%motion)
-      end if
-      if (.not. allocated(self%modal)) then
-         associate (n => self%modes%n)
-            allocate (self%modal(s, n), self%reply(s, n), self%stiff(s, n), self%rest(n), self%motion(n))
-         end associate
-      end if
+      associate (most => size(self%modes%omega_2))
+         if (allocated(self%modal)) then
+            if (size(self%modal, 2) /= most) deallocate (self%modal, self%reply, self%stiff, self%rest, self%motion)
+         end if
+         if (.not. allocated(self%modal)) &
+            allocate (self%modal(s, most), self%reply(s, most), self%stiff(s, most), self%rest(most), self%motion(most))
+      end associate
       if (self%has_history) then
          call restore_nodes(self, self%last)
          call remove_stiff_part(self, self%last)
@@ -374,10 +373,12 @@ contains
       self%now%h_last = 0.0_wp
       self%now%h_a = h*self%rule%a
       self%now%h2_a2 = h**2*self%rule%a2
-      if (allocated(self%now%g)) then
-         if (size(self%now%g, 3) /= self%modes%n) deallocate (self%now%g)
-      end if
-      if (.not. allocated(self%now%g)) allocate (self%now%g(s, s, self%modes%n))
+      associate (most => size(self%modes%omega_2))
+         if (allocated(self%now%g)) then
+            if (size(self%now%g, 3) /= most) deallocate (self%now%g)
+         end if
+         if (.not. allocated(self%now%g)) allocate (self%now%g(s, s, most))
+      end associate
       associate (lambda => self%rule%lambda)
          do i = 1, self%modes%n
             x = h*self%modes%damping(i)*lambda + (h**2*self%modes%omega_2(i))*lambda**2
@@ -425,7 +426,7 @@ contains
          call combine(modes%n, self%now%g, self%modal, self%reply)
          call accumulate(modes%n, self%stiff, self%reply)
          call copy(m, self%trial%smooth, self%trial%f)
-         call expand(m, modes%n, modes%u, self%reply, self%trial%f)
+         call expand(m, modes%n, size(modes%u, 1), modes%u, self%reply, self%trial%f)
       end associate
    end subroutine predict
 
@@ -434,15 +435,19 @@ contains
    !> is what the error of the guess does to Q, A^2 dN.
    subroutine choose_degree(self)
       class(gauss_integrator), intent(inout) :: self
-      real(wp) :: errors(size(degrees))
+      real(wp) :: errors(size(degrees)), sums(s)
+      real(wp), dimension(s, s) :: a2, ahead
       integer :: i, m
 
       m = self%mechanics%n_dof
       do i = 1, size(degrees)
-         call multiply(m, matmul(self%rule%a2, self%rule%interpolation(1.0_wp, self%now%h/self%last%h, degrees(i))), &
-                       self%last%smooth, self%guess)
-         call apply(m, -self%rule%a2, self%trial%smooth, self%guess)
-         errors(i) = sum(square_sums(m, self%guess, self%weight))
+         ahead = self%rule%interpolation(1.0_wp, self%now%h/self%last%h, degrees(i))
+         a2 = matmul(self%rule%a2, ahead)
+         call multiply(m, a2, self%last%smooth, self%guess)
+         a2 = -self%rule%a2
+         call apply(m, a2, self%trial%smooth, self%guess)
+         sums = square_sums(m, self%guess, self%weight)
+         errors(i) = sum(sums)
       end do
       i = minloc(errors, dim=1)
       if (degrees(i) /= self%degree) self%now%h_last = 0.0_wp
@@ -473,7 +478,7 @@ contains
       type(step_record), intent(inout) :: record
       call stiff_rates(self, record%q, record%p)
       record%smooth(:, :) = record%f
-      call expand(self%mechanics%n_dof, self%modes%n, self%modes%u, self%modal, record%smooth)
+      call expand(self%mechanics%n_dof, self%modes%n, size(self%modes%u, 1), self%modes%u, self%modal, record%smooth)
    end subroutine remove_stiff_part
 
    !> Q and P of the last step, whose last correction `iterate` may have left out.
@@ -531,7 +536,7 @@ contains
          call residual(m, self%trial%a, self%trial%f, self%guess, self%trial%smooth)
          call project(m - base, self%modes%n, self%modes%v, self%guess(:, base + 1:), self%modal)
          call combine(self%modes%n, self%now%g, self%modal, self%reply)
-         call expand(m, self%modes%n, self%modes%u, self%reply, self%guess)
+         call expand(m, self%modes%n, size(self%modes%u, 1), self%modes%u, self%reply, self%guess)
          call add(m, self%guess, self%weight, self%trial%f, sums)
          change = self%now%h*sqrt(sum(sums)/real(s*m, wp))
          call judge(done)

@@ -110,7 +110,7 @@ contains
       real(wp), intent(in) :: v(n, m), x(s, n)
       real(wp), intent(out) :: z(s, m)
       z = 0.0_wp
-      call expand(m, n, v, x, z)
+      call expand(m, n, n, v, x, z)
    end subroutine project
 
    !> f_i = sum_j v(j, i) x_j and g_i = sum_j v(j, i) y_j: no lanes, but eight sums at a time, none of which waits for another.
@@ -141,9 +141,9 @@ contains
    end subroutine project_pair
 
    !> x(:, j) = x(:, j) + sum_i u(i, j) z(:, i). Four columns of z stay in registers while x goes by.
-   pure subroutine expand(n, m, u, z, x)
-      integer, intent(in) :: n, m
-      real(wp), intent(in) :: u(m, n), z(s, m)
+   pure subroutine expand(n, m, n_rows, u, z, x)
+      integer, intent(in) :: n, m, n_rows !! rows of u, of which m are used
+      real(wp), intent(in) :: u(n_rows, n), z(s, m)
       real(wp), intent(inout) :: x(s, n)
       real(wp), dimension(s) :: z_1, z_2, z_3, z_4
       integer :: i, j, l

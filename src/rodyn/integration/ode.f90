@@ -30,11 +30,13 @@ module rodyn_ode
    !> The stiff part of M(q) p' = ... - K q - D p near a configuration, as modes: S = M^-1 K ~ sum omega^2 u v^T and
    !> M^-1 D ~ sum damping u v^T, with v_i^T u_j = delta_ij.
    type :: stiff_modes
-      integer :: n = 0                       !! modes
-      real(wp), allocatable :: omega_2(:)    !! square of the natural frequency (n) [rad^2/s^2]
-      real(wp), allocatable :: damping(:)    !! (n) [1/s]
-      real(wp), allocatable :: u(:, :)       !! shapes, transposed (n, n_dof)
-      real(wp), allocatable :: v(:, :)       !! their duals, without ignorable coordinates (n_dof - n_ignorable, n)
+      integer :: n = 0                       !! modes; their number changes, so the arrays have room for `most`
+      real(wp), allocatable :: omega_2(:)    !! square of the natural frequency (most) [rad^2/s^2]
+      real(wp), allocatable :: damping(:)    !! (most) [1/s]
+      real(wp), allocatable :: u(:, :)       !! shapes, transposed (most, n_dof)
+      real(wp), allocatable :: v(:, :)       !! their duals, without ignorable coordinates (n_dof - n_ignorable, most)
+   contains
+      procedure :: reserve
    end type stiff_modes
 
    !> A mechanical system: y = (q, p [, quadratures]) with p' from q, p and t, and q' = p. If there are ignorable
@@ -126,6 +128,18 @@ contains
       associate (unused => self, unused_t => t, unused_y => y); end associate
       values = 1.0_wp
    end subroutine event_functions
+
+   !> Make room for so many modes, if that is not what there is.
+   subroutine reserve(self, most, n_dof, n_ignorable)
+      class(stiff_modes), intent(inout) :: self
+      integer, intent(in) :: most, n_dof, n_ignorable
+
+      if (allocated(self%omega_2)) then
+         if (size(self%omega_2) == most) return
+         deallocate (self%omega_2, self%damping, self%u, self%v)
+      end if
+      allocate (self%omega_2(most), self%damping(most), self%u(most, n_dof), self%v(n_dof - n_ignorable, most))
+   end subroutine reserve
 
    !> Factor 1 - gamma df/dy. Nothing depends on the quadratures; their rows are left out, so that a system with them is
    !> solved to the last bit as one without. Their own correction is within the tolerance of the iteration.
