@@ -1,0 +1,10 @@
+!> The precision of what checks the program; `bench/quadruple/build.py` puts that of its programs here.
+module rodyn_bench_wide_kind
+   use, intrinsic :: iso_fortran_env, only: real128
+   implicit none (type, external)
+   private
+   public :: qp
+
+   integer, parameter :: qp = real128
+
+end module rodyn_bench_wide_kind
