@@ -57,7 +57,8 @@ class Scene:
         return y[first:first + self.n], y[rates:rates + self.n] if self.kind == "flexible" else y[:0]
 
 
-def read_scene(path: str, hinge_factor: float = 1.0) -> Scene:
+def read_scene(path: str, hinge_factor: float = 1.0, number: type = float) -> Scene:
+    """The scene in `number`: what follows from the numbers of the file is computed in its precision."""
     groups = read_namelist(pathlib.Path(path).read_text())
     case, craft, chain = (groups[name][0] for name in ("case", "spacecraft", "chain"))
     model = groups.get("model", [{}])[0]
@@ -66,23 +67,24 @@ def read_scene(path: str, hinge_factor: float = 1.0) -> Scene:
     n = chain["n_rods"]
 
     def spread(key: str, default: float = 0.0) -> np.ndarray:
-        return np.broadcast_to(np.asarray(chain.get(key, default), float), n).copy()
+        return np.broadcast_to(np.asarray(chain.get(key, default), float), n).astype(number)
 
     lumped, bending = model.get("inertia") == "lumped", model.get("bending", "dynamic")
     kind = "lumped" if lumped else "rigid" if bending == "rigid" else "flexible"
-    length, stiffness = spread("length"), hinge_factor * spread("hinge_stiffness")
+    length, stiffness = spread("length"), number(hinge_factor) * spread("hinge_stiffness")
     rods, on_hinge = rod_constants(kind, length, spread("mass_per_length"), spread("bending_stiffness"), spread("node_mass"))
     series = three_moments(stiffness, length / (6 * spread("bending_stiffness"))) if bending == "quasistatic" else None
     free = craft.get("motion", "free") == "free"
-    body = np.array([craft.get("mass", 0.0), craft.get("inertia", 0.0), craft["hinge_x"], craft["hinge_y"], on_hinge], float)
+    body = np.array([craft.get("mass", 0.0), craft.get("inertia", 0.0), craft["hinge_x"], craft["hinge_y"], 0.0]).astype(number)
+    body[4] = on_hinge
     return Scene(n, kind, free, rods, stiffness, spread("hinge_damping"), series, body, segments_of(groups.get("load", []), case["t_end"], n))
 
 
 def rod_constants(kind: str, l: np.ndarray, m: np.ndarray, ei: np.ndarray, mu: np.ndarray) -> tuple[np.ndarray, float]:
-    c = np.zeros((l.size, COUNT))
+    c = np.zeros((l.size, COUNT), l.dtype)
     c[:, LENGTH], c[:, MU] = l, mu
     if kind == "lumped":  # half of each rod to each of its nodes
-        half = 0.5 * m * l
+        half = m * l / 2
         c[:, MU] += half
         c[:-1, MU] += half[1:]
         return c, half[0]
@@ -96,7 +98,7 @@ def rod_constants(kind: str, l: np.ndarray, m: np.ndarray, ei: np.ndarray, mu: n
     c[:, AA], c[:, AB], c[:, BB] = m * l**3 / 105, -m * l**3 / 140, m * l**3 / 105
     c[:, KAPPA] = 2 * ei / l
     for row in c:
-        inverse = np.linalg.inv([[row[AA], row[AB]], [row[AB], row[BB]]])
+        inverse = inverse_of(row[[[AA, AB], [AB, BB]]])
         row[I11], row[I12], row[I22] = inverse[0, 0], inverse[0, 1], inverse[1, 1]
         row[G1:G2 + 1] = inverse @ row[[A1, B1]]
         row[H1:H2 + 1] = inverse @ row[[SA, SB]]
@@ -108,13 +110,25 @@ def rod_constants(kind: str, l: np.ndarray, m: np.ndarray, ei: np.ndarray, mu: n
 
 def three_moments(stiffness: np.ndarray, slope: np.ndarray) -> np.ndarray:
     """th = (I + F C)^-1 opening."""
-    return np.linalg.inv(np.eye(slope.size) + three_moment_matrix(slope) * stiffness)
+    return inverse_of(np.eye(slope.size).astype(slope.dtype) + three_moment_matrix(slope) * stiffness)
+
+
+def inverse_of(matrix: np.ndarray) -> np.ndarray:
+    """By Gauss and Jordan, in any precision; rows need no exchange in matrices as these."""
+    n = len(matrix)
+    both = np.concatenate([matrix, np.eye(n).astype(matrix.dtype)], axis=1)
+    for i in range(n):
+        both[i] = both[i] / both[i, i]
+        for j in range(n):
+            if j != i:
+                both[j] = both[j] - both[j, i] * both[i]
+    return both[:, n:]
 
 
 def three_moment_matrix(slope: np.ndarray) -> np.ndarray:
     """F: beta_k - alpha_{k+1} = F T, alpha_k = -s_k (2 T_{k-1} + T_k), beta_k = s_k (T_{k-1} + 2 T_k), T_n = 0."""
     n = slope.size
-    f = np.zeros((n, n))
+    f = np.zeros((n, n), slope.dtype)
     for k in range(n):  # hinge k, between rod k and rod k + 1 (slope[k])
         f[k, k] += 2 * slope[k]
         if k + 1 < n:

@@ -79,20 +79,21 @@ def result(scene: Scene, states: list[np.ndarray]) -> dict[str, Any]:
 
 
 def prepare_reference(job: dict[str, Any]):
-    """In quadruple precision: a solution to compare with."""
-    scene = read_scene(job["scene"])
-    made = [hy.taylor_adaptive(expressions(scene, s), np.zeros(2 * scene.n_dof, dtype=hy.real128), time=hy.real128(s.start),
-                               tol=hy.real128(job["rtol"]), fp_type=hy.real128, compact_mode=True) for s in scene.segments]
+    """In extended or quadruple precision: a solution to compare with."""
+    number = {"extended": np.longdouble, "quadruple": hy.real128}[job["precision"]]
+    scene = read_scene(job["scene"], number=number)
+    made = [hy.taylor_adaptive(expressions(scene, s), np.zeros(2 * scene.n_dof, dtype=number), time=number(s.start),
+                               tol=number(job["rtol"]), fp_type=number, compact_mode=True) for s in scene.segments]
 
     def run():
         states = []
         start = time.perf_counter()
-        state = np.zeros(2 * scene.n_dof, dtype=hy.real128)
+        state = np.zeros(2 * scene.n_dof, dtype=number)
         for segment, ta in zip(scene.segments, made, strict=True):
-            ta.time = hy.real128(segment.start)
+            ta.time = number(segment.start)
             ta.state[:] = state
             for t in [t for t in job["probe_times"] if segment.start < t < segment.end] + [segment.end]:
-                ta.propagate_until(hy.real128(t))
+                ta.propagate_until(number(t))
                 if t in job["probe_times"]:
                     states.append(np.array([float(x) for x in ta.state]))
             state = ta.state.copy()

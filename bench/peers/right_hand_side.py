@@ -16,7 +16,7 @@ def spring_and_damper(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     """T = spring @ phi + damper @ phi' of hinges in series with bending, docs/model.md sec. 5."""
     if scene.series is None:
         return np.zeros((1, 1)), np.zeros((1, 1))
-    opening = np.eye(scene.n) - np.eye(scene.n, k=-1)
+    opening = (np.eye(scene.n) - np.eye(scene.n, k=-1)).astype(scene.series.dtype)
     theta = scene.series @ opening
     return scene.stiffness[:, None] * theta, scene.series.T @ (scene.damping[:, None] * theta)
 

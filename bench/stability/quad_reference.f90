@@ -5,18 +5,18 @@
 !>     (sum m G^T G) x'' = forces - sum m G^T g,
 !> Cholesky, and Gragg's extrapolated midpoint rule for the motion. Nothing is eliminated, no moving frame, no recursion.
 module rodyn_bench_quad_reference
-   use, intrinsic :: iso_fortran_env, only: qp => real128
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: case_config
+   use rodyn_bench_wide_kind, only: qp
+   use rodyn_bench_extrapolation, only: smooth_system, extrapolated_step
    implicit none (type, external)
    private
    public :: qp, quad_accelerations, quad_motion, condition_number, supported
 
    integer, parameter :: n_points = 4 !! exact for the cubes of the shape functions
-   integer, parameter :: columns = 10 !! of the extrapolation: order 20
 
-   !> What does not change.
-   type :: quad_scene
+   !> What does not change, and the equations of motion of y = (x, x').
+   type, extends(smooth_system) :: quad_scene
       integer :: n = 0, n_base = 3, m = 0
       logical :: flexible = .true.
       real(qp) :: mass = 0.0_qp, inertia = 0.0_qp, hinge(2) = 0.0_qp
@@ -24,6 +24,8 @@ module rodyn_bench_quad_reference
       real(qp) :: load(3) = 0.0_qp              !! on the spacecraft, moving axes
       real(qp), allocatable :: node_load(:, :)  !! (2, n)
       real(qp) :: point(n_points), weight(n_points) !! on [0, 1]
+   contains
+      procedure :: rates
    end type quad_scene
 
 contains
@@ -166,7 +168,7 @@ contains
       associate (m => scene%m)
          call to_inertial(scene, q, p, y(:m), y(m + 1:))
          do i = 1, steps
-            call extrapolated_step(scene, real(t, qp)/steps, y)
+            call extrapolated_step(scene, 0.0_qp, real(t, qp)/steps, y) ! the equations do not know the time
          end do
          q = y(:m)
          p = y(m + 1:)
@@ -193,47 +195,19 @@ contains
       v(1:2) = [c*p(1) - s*p(2), s*p(1) + c*p(2)]
    end subroutine to_inertial
 
-   !> Midpoint rule with 2, 4, ... 2 columns substeps, extrapolated (Hairer, Norsett & Wanner, Solving ODEs I, sec. II.9).
-   subroutine extrapolated_step(scene, h, y)
-      type(quad_scene), intent(in) :: scene
-      real(qp), intent(in) :: h
-      real(qp), intent(inout) :: y(:)
-      real(qp), dimension(size(y)) :: before, now, next, rate, first
-      real(qp) :: table(size(y), columns), d
-      integer :: i, j, k
-
-      call rates(scene, y, first)
-      do j = 1, columns
-         d = h/(2*j)
-         before = y
-         now = y + d*first
-         do i = 1, 2*j
-            call rates(scene, now, rate)
-            if (i == 2*j) exit
-            next = before + 2.0_qp*d*rate
-            before = now
-            now = next
-         end do
-         table(:, j) = 0.5_qp*(now + before + d*rate)
-         do k = j - 1, 1, -1 ! table(:, k) becomes T(j, j - k + 1)
-            table(:, k) = table(:, k + 1) + (table(:, k + 1) - table(:, k))/((real(j, qp)/k)**2 - 1.0_qp)
-         end do
-      end do
-      y = table(:, 1)
-   end subroutine extrapolated_step
-
-   subroutine rates(scene, y, rate)
-      type(quad_scene), intent(in) :: scene
-      real(qp), intent(in) :: y(:)
-      real(qp), intent(out) :: rate(:)
-      associate (m => scene%m)
+   subroutine rates(self, t, y, rate)
+      class(quad_scene), intent(inout) :: self
+      real(qp), intent(in) :: t
+      real(qp), contiguous, intent(in) :: y(:)
+      real(qp), contiguous, intent(out) :: rate(:)
+      associate (unused => t, m => self%m)
          rate(:m) = y(m + 1:)
-         call second_derivative(scene, y(:m), y(m + 1:), rate(m + 1:))
+         call second_derivative(self, y(:m), y(m + 1:), rate(m + 1:))
       end associate
    end subroutine rates
 
    subroutine second_derivative(scene, x, v, acceleration)
-      type(quad_scene), intent(in) :: scene
+      class(quad_scene), intent(in) :: scene
       real(qp), intent(in) :: x(:), v(:)
       real(qp), intent(out) :: acceleration(:)
       real(qp) :: mass(scene%m, scene%m)
@@ -245,7 +219,7 @@ contains
 
    !> Mass matrix (lower triangle) and generalised forces.
    subroutine equations(scene, x, v, mass, force)
-      type(quad_scene), intent(in) :: scene
+      class(quad_scene), intent(in) :: scene
       real(qp), intent(in) :: x(:), v(:)
       real(qp), intent(out) :: mass(:, :), force(:)
       real(qp), dimension(scene%m, 2) :: jacobian, at_node
@@ -334,7 +308,7 @@ contains
 
    !> Moments of hinges and rods.
    subroutine add_springs(scene, x, v, force)
-      type(quad_scene), intent(in) :: scene
+      class(quad_scene), intent(in) :: scene
       real(qp), intent(in) :: x(:), v(:)
       real(qp), intent(inout) :: force(:)
       real(qp) :: opening, rate, moment

@@ -24,7 +24,9 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 RESULTS = ROOT / "results" / "stability"
 DOCUMENT = ROOT / "docs" / "stability.md"
 PICTURE = ROOT / "docs" / "pictures" / "energy-drift"
-sys.path.insert(0, str(ROOT / "postproc"))
+QUAD_ORDERS = ROOT / "bench" / "stability" / "quad_orders" / "quad_orders.f90"
+sys.path[:0] = [str(ROOT / "postproc"), str(ROOT / "bench" / "wide")]
+from precisions import wide_program  # noqa: E402
 
 ROD = [*(("1e6", method) for method in ("gauss:fixed", "gauss:1e-8", "dop853:1e-8", "erk8:1e-8", "adams:1e-8", "bdf:1e-8")),
        *(("1e5", f"erk{order}:1e-8") for order in (7, 6, 5)), ("3e4", "erk4:1e-8"), ("1e4", "erk3:1e-6"), ("1e4", "erk2:1e-5")]
@@ -55,27 +57,8 @@ def measure(part: str) -> None:
     else:
         text = output_of([example(), part])
     if part == "orders":
-        (RESULTS / "orders_quad.txt").write_text(output_of([quad_orders()], output_of([example(), "tableaux"])))
+        (RESULTS / "orders_quad.txt").write_text(output_of([wide_program("quadruple", QUAD_ORDERS, QUAD_ORDERS.parent)], output_of([example(), "tableaux"])))
     (RESULTS / f"{part}.txt").write_text(text)
-
-
-#: What `gauss` and `dop853` consist of, in the order of compilation; before it `kinds.f90` with another precision.
-INTEGRATORS = ["base/lanes", "base/errors", "base/lapack", "scene/quadrature", "dynamics/trigonometry", "integration/dense_newton",
-               "integration/ode", "integration/integrator", "integration/event_search", "integration/dop853_tableau",
-               "integration/dop853_integrator", "integration/lane_algebra", "integration/gauss_collocation",
-               "integration/gauss_integrator"]
-
-
-def quad_orders() -> str:
-    """Path of the program that measures orders in quadruple precision."""
-    place, sources, here = RESULTS / "quad", ROOT / "src" / "rodyn", ROOT / "bench/stability/quad_orders"
-    place.mkdir(parents=True, exist_ok=True)
-    (place / "kinds.f90").write_text((sources / "base" / "kinds.f90").read_text().replace("real64", "real128"))
-    program = place / "quad_orders"
-    subprocess.run([os.environ.get("FPM_FC", "mpifort"), "-O2", "-fimplicit-none", f"-J{place}", "-o", program, place / "kinds.f90",
-                    *(sources / f"{name}.f90" for name in INTEGRATORS),
-                    *(here / f"{name}.f90" for name in ("problems", "table_steps", "main")), "-llapack", "-lblas"], check=True)
-    return str(program)
 
 
 def output_of(command: list[str], given: str | None = None) -> str:

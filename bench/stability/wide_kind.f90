@@ -1,4 +1,4 @@
-!> The precision of what checks the program; `bench/quadruple/build.py` puts that of its programs here.
+!> The precision of what checks the program; `bench/wide/precisions.py` puts another in its place.
 module rodyn_bench_wide_kind
    use, intrinsic :: iso_fortran_env, only: real128
    implicit none (type, external)

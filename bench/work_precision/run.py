@@ -38,8 +38,9 @@ import numpy as np
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
-sys.path.insert(0, str(ROOT / "postproc"))
+sys.path[:0] = [str(ROOT / "postproc"), str(ROOT / "bench" / "wide")]
 from namelist import read_namelist  # noqa: E402
+from precisions import DIGITS, exact, wide_program  # noqa: E402
 
 SCENES = ["table1", "table1_30s", "example", "beam", "stiff", "damped", "lumped", "rigid", "chain_16", "chain_64", "chain_256",
           "chain_1024"]
@@ -60,6 +61,7 @@ DOCUMENTED = ["table1", "rigid"]  # scenes whose pictures are in it
 MARK = "<!-- Below: written by bench/work_precision/run.py --docs -->"
 #: Scenes that bench/stability/quad_reference.f90 knows and can afford: its steps between two probe times.
 QUAD_STEPS = {"table1": 400, "rigid": 40}
+HEYOKA = {"quadruple": 1e-20, "extended": 1e-19}  # tolerances of references
 NO_SOLUTION = 10.0  # an error of phi beyond it is none
 
 
@@ -98,7 +100,7 @@ class Worker:
         return answer
 
     def text(self, job: dict[str, Any]) -> str:
-        return job_namelist(job) if self.name == "rodyn" else json.dumps(job)
+        return job_namelist(job) if self.name in ("rodyn", *DIGITS) else json.dumps(job)
 
     def start(self) -> None:
         environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
@@ -230,45 +232,50 @@ class Benchmark:
         say(f"{scene}: {sum(bool(c.seconds) for c in computations)} of {len(computations)} computations, {time.monotonic() - start:.0f} s")
 
     def reference(self, base: dict[str, Any]) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-        """Two methods that share nothing but the model where heyoka knows the scene, else two of Rodyn's; both in quadruple
-        precision where that can be afforded. The first is the reference, their difference what it is worth. References are kept
-        beside the results, by the text of the scene."""
-        text = pathlib.Path(base["scene"]).read_text()
-        key = hashlib.sha256(json.dumps([text, base["probe_times"], sorted(self.workers)]).encode()).hexdigest()[:16]
-        stem = pathlib.Path(base["scene"]).stem
-        kept = self.references / f"{stem}-{key}{'-quad' if stem in QUAD_STEPS else ''}.json"
+        """Of the candidates the first two that are to be had: the reference, and what shows how far it is to be trusted. All
+        compute in more than double precision. They are kept beside the results, by the text of the scene and their names."""
+        text, stem = pathlib.Path(base["scene"]).read_text(), pathlib.Path(base["scene"]).stem
+        n = read_namelist(text)["chain"][0]["n_rods"]
+        precision = "quadruple" if n <= 16 and stem not in ("stiff", "damped") else "extended"
+        candidates = [(f"heyoka in {precision} precision", "heyoka", {"method": "reference", "rtol": HEYOKA[precision], "precision": precision}),
+                      ("other equations, extrapolated in quadruple precision", "other", {}),
+                      ("dop853 in extended precision", "extended", {"method": "dop853", "rtol": 1e-18, "atol": 1e-20}),
+                      ("Gragg's extrapolation in quadruple precision", "quadruple", {"method": "gragg", "rtol": 1e-17, "atol": 1e-19})]
+        able = {*self.workers, *DIGITS, *(["other"] if stem in QUAD_STEPS else [])}
+        candidates = [candidate for candidate in candidates if candidate[1] in able]
+        key = hashlib.sha256(json.dumps([text, base["probe_times"], candidates]).encode()).hexdigest()[:16]
+        kept = self.references / f"{stem}-{key}.json"
         if kept.is_file():
             known = json.loads(kept.read_text())
             return {k: np.array(v) for k, v in known["reference"].items()}, known["said"]
-        groups = read_namelist(text)
-        n, t_end = groups["chain"][0]["n_rods"], groups["case"][0]["t_end"]
-        quadruple = n <= 16 and t_end <= 30 and stem not in ("stiff", "damped")
-        found: list[tuple[str, dict[str, np.ndarray]]] = []
-        candidates = [("heyoka in quadruple precision, tolerance 1e-20", "heyoka" if quadruple else "", {"method": "reference", "rtol": 1e-20}),
-                      ("heyoka, tolerance 2.3e-16", "heyoka" if not quadruple and n <= 64 else "", {"method": "heyoka", "rtol": 2.3e-16}),
-                      ("other equations, extrapolated in quadruple precision", "quad" if stem in QUAD_STEPS else "", {}),
-                      ("dop853, rtol 1e-14", "rodyn", {"method": "dop853", "rtol": 1e-14, "atol": 1e-16}),
-                      ("erk 8, rtol 1e-14", "rodyn", {"method": "erk", "order": 8, "rtol": 1e-14, "atol": 1e-16})]
+        self.references.mkdir(parents=True, exist_ok=True)
+        found: dict[str, dict[str, np.ndarray]] = {}
         for name, worker, job in candidates:
+            answer = self.solution(worker, base | job | {"budget": 3000.0, "repeats": 1})
+            if answer is not None:
+                found[name] = answer
             if len(found) == 2:
                 break
-            if worker == "quad":
-                found.append((name, quad_reference(base, QUAD_STEPS[stem])))
+        else:
+            raise SystemExit(f"no two references for {base['scene']}")
+        (name, best), (check, other) = found.items()
+        said = {"reference": name, "reference_check": check} | {
+            f"agreement_{key}": float(np.abs(best[key] - other[key]).max()) for key in best if best[key].size}
+        kept.write_text(json.dumps({"reference": {k: v.tolist() for k, v in best.items()}, "said": said}))
+        return best, said
+
+    def solution(self, worker: str, job: dict[str, Any]) -> dict[str, np.ndarray] | None:
+        """phi and alpha' (probe, rod), if this worker finds them."""
+        if worker == "other":
+            return quad_reference(job, QUAD_STEPS[pathlib.Path(job["scene"]).stem])
+        if worker in DIGITS:
+            scene = pathlib.Path(job["scene"])
+            job = job | {"scene": str(self.references / f"{scene.stem}-exact.nml")}
+            pathlib.Path(job["scene"]).write_text(exact(scene.read_text()))
             if worker not in self.workers:
-                continue
-            answer = self.workers[worker].ask(base | job | {"budget": 200.0, "repeats": 1}, 240.0)
-            if answer["status"] == "done":
-                found.append((name, {key: np.array(answer[key]) for key in ("phi", "alpha_rate")}))
-        if not found:
-            raise SystemExit(f"no reference for {base['scene']}")
-        said: dict[str, Any] = {"reference": found[0][0], "reference_check": found[1][0] if len(found) > 1 else "none"}
-        for key in ("phi", "alpha_rate"):
-            if found[0][1][key].size:
-                difference = np.abs(found[0][1][key] - found[1][1][key]).max() if len(found) > 1 else math.nan
-                said[f"agreement_{key}"] = float(difference)
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        kept.write_text(json.dumps({"reference": {k: v.tolist() for k, v in found[0][1].items()}, "said": said}))
-        return found[0][1], said
+                self.workers[worker] = Worker(worker, [wide_program(worker, ROOT / "bench/work_precision.f90", ROOT / "bench/stability")])
+        answer = self.workers[worker].ask(job, 3600.0)
+        return {key: np.array(answer[key]) for key in ("phi", "alpha_rate")} if answer["status"] == "done" else None
 
     def explore(self, lines: list[Line], base: dict[str, Any], t_end: float, reference: dict[str, np.ndarray], end: float) -> list[Computation]:
         """Every line from loose to tight, all lines abreast, each until its next computation is expected to exceed the budget."""
