@@ -1,5 +1,5 @@
 !> Gragg's extrapolation as an integrator of the program, compiled with another wp: steps chosen as `dop853` chooses its own,
-!> but outputs and the stop time are stepped to.
+!> but outputs and the stop time are stepped to. Events are not looked for.
 module rodyn_bench_gragg_integrator
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp

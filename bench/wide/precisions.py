@@ -14,7 +14,7 @@ from decimal import Decimal
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
-SOURCES, LIBRARY = ROOT / "src" / "rodyn", "base/lapack.f90"
+SOURCES = ROOT / "src" / "rodyn"
 #: Decimal digits asked for: `extended` is x86's 80 bits (1e-19) in hardware, `quadruple` 128 bits (1e-34) in software.
 DIGITS = {"extended": 18, "quadruple": 33}
 
@@ -27,11 +27,11 @@ def wide_program(precision: str, main: pathlib.Path, *folders: pathlib.Path) -> 
                  for path in (SOURCES / "base/kinds.f90", ROOT / "bench/stability/wide_kind.f90")}
     generated[place / "lapack.c"] = "#include <stdlib.h>\n" + "".join(
         f"void __attribute__((weak)) {name}_(void) {{ abort(); }}\n"
-        for name in re.findall(r"end subroutine (d\w+)", (SOURCES / LIBRARY).read_text()))
+        for name in re.findall(r"end subroutine (d\w+)", (SOURCES / "base/lapack.f90").read_text()))
     for path, text in generated.items():
         if not path.is_file() or path.read_text() != text:
             path.write_text(text)
-    modules = {}
+    modules: dict[str, pathlib.Path] = {}
     for folder in (SOURCES, *folders, HERE, place):
         for path in folder.rglob("*.f90"):
             modules |= dict.fromkeys(re.findall(r"^ *module (\w+)$", path.read_text(), re.MULTILINE), path)
