@@ -16,7 +16,7 @@ module rodyn_scene_modes
    use rodyn_lapack, only: dpotrf, dtrsm, dsyev, dgemv
    implicit none (type, external)
    private
-   public :: modes_finder, new_modes_finder
+   public :: modes_finder, new_modes_finder, most_dof
 
    integer, parameter :: most_dof = 200 !! beyond, eigenvectors cost more than they bring
    real(wp), parameter :: negligible = 1.0e-5_wp !! b_i.b_j, of the smaller omega^2

@@ -11,9 +11,11 @@ module rodyn_method_choice
    use rodyn_text, only: to_text, formatted
    use rodyn_case_config, only: none_given, solver_config
    use rodyn_scene, only: scene_type
+   use rodyn_scene_modes, only: most_dof
    use rodyn_fastest_rates, only: fastest_rates, with_rigid_rods
    use rodyn_integrator, only: monitor_type, solver_options, time_text
-   use rodyn_method_trial, only: candidates, n_even, effort_of_nodes, try_methods
+   use rodyn_method_trial, only: fast_rates, candidates, n_even, effort_of_nodes, effort_of_modes, &
+      collocation_step, explicit_step, try_methods
    implicit none (type, external)
    private
    public :: method_choice, choose_method
@@ -24,22 +26,16 @@ module rodyn_method_choice
       logical :: automatic = .false.          !! `auto` chose
       logical :: tried = .false.              !! after a trial
       real(wp) :: effort = 0.0_wp             !! of the trial, in right-hand sides
-      real(wp) :: frequency = 0.0_wp          !! highest natural frequency [rad/s]
-      real(wp) :: decay = 0.0_wp              !! fastest decay [1/s]
+      type(fast_rates) :: rates               !! of the scene
       real(wp) :: steps = 0.0_wp              !! forecast
       real(wp) :: advantage = 1.0_wp          !! over explicit steps, by the trial
    contains
       procedure :: reason
    end type method_choice
 
-   real(wp), parameter :: vibration_limit = 3.0_wp !! step times frequency that order 8 takes
-   real(wp), parameter :: stability_limit = 6.0_wp !! step times decay rate that it bears
-   real(wp), parameter :: stages = 12.0_wp         !! right-hand sides of its step
-   real(wp), parameter :: iterations = 4.0_wp      !! of a collocation step
-   real(wp), parameter :: first_search = 20.0_wp   !! right-hand sides per unknown that its first modes cost
-   real(wp), parameter :: long_run = 5000.0_wp     !! right-hand sides of an explicit run that are worth a trial
-   real(wp), parameter :: stiff_ratio = 200.0_wp   !! fastest rate over the chain's frequencies from where implicit steps may pay
-   real(wp), parameter :: trial_share = 0.5_wp     !! of a run that follows all vibrations, spent on one candidate at most
+   real(wp), parameter :: stability_limit = 6.4_wp !! step times decay rate that it bears
+   real(wp), parameter :: lasting = 150.0_wp       !! times the fastest decay that vibrations with dampers last
+   real(wp), parameter :: short_run = 1500.0_wp    !! right-hand sides that are not worth a trial
    real(wp), parameter :: lead = 1.1_wp            !! by which an implicit method must be faster: it is less accurate
 
 contains
@@ -53,7 +49,7 @@ contains
       real(wp), intent(in) :: y(:)  !! state at t = 0, without quadratures
       real(wp), intent(in) :: t_end !! [s]
       class(monitor_type), target, intent(inout), optional :: monitor !! of the run; what is chosen after a stop is of no use
-      real(wp) :: slow, explicit, expected(n_even), forecast(size(candidates))
+      real(wp) :: slow, ratio, expected(n_even), forecast(size(candidates))
       integer :: best
 
       choice%method = trim(solver%method)
@@ -61,23 +57,26 @@ contains
       choice%automatic = solver%method == 'auto'
       if (.not. choice%automatic) return
       choice%method = 'dop853'
-      call fastest_rates(scene, y(:scene%n_q), choice%frequency, choice%decay)
-      explicit = stages*t_end*max(choice%frequency/vibration_limit, choice%decay/stability_limit)
-      choice%steps = explicit/stages
-      expected = expected_efforts(scene, options, choice%frequency, choice%decay, t_end)
-      ! Latching excites all vibrations of the rods, which a trial on the beginning of the run does not see.
-      if (scene%dynamic_bending .and. any(scene%hinges%mechanisms%latch < none_given)) return
-      slow = 0.0_wp
-      if (explicit >= long_run) &
-         call fastest_rates(with_rigid_rods(scene), y(:scene%n_base + scene%n + scene%n_q - scene%n_dof), slow)
-      if (explicit < long_run .or. max(choice%frequency, choice%decay) < stiff_ratio*slow) then
-         if (expected(1) <= expected(2)) return
-         choice%method = 'gauss'
-         choice%steps = t_end*choice%frequency/collocation_phase(options%rtol)
-         return
-      end if
-      call try_methods(scene, y, options, minval([t_end, scene%switches]), t_end, &
-                       expected, trial_share, forecast, choice%effort, monitor)
+      associate (rates => choice%rates)
+         call fastest_rates(scene, y(:scene%n_q), rates%frequency, rates%decay)
+         choice%steps = expected_steps('dop853', options, rates, t_end)
+         ! Latching excites all vibrations of the rods, which a trial on the beginning of the run does not see.
+         if (scene%dynamic_bending .and. any(scene%hinges%mechanisms%latch < none_given)) return
+         ratio = 1.0_wp
+         if (minval(expected_efforts(scene, options, rates, ratio, t_end)) >= short_run) then
+            call fastest_rates(with_rigid_rods(scene), y(:scene%n_base + scene%n + scene%n_q - scene%n_dof), slow)
+            if (slow > 0.0_wp) ratio = max(rates%frequency, rates%decay)/slow
+         end if
+         expected = expected_efforts(scene, options, rates, ratio, t_end)
+         if (minval(expected) < short_run .or. ratio < stiff_from(options%rtol, rates)) then
+            if (expected(1) <= expected(2)) return
+            choice%method = 'gauss'
+            choice%steps = expected_steps('gauss', options, rates, t_end)
+            return
+         end if
+         call try_methods(scene, y, options, minval([t_end, scene%switches]), t_end, rates, expected, &
+                          forecast, choice%effort, monitor)
+      end associate
       forecast(:2) = forecast(:2)/lead ! dop853, gauss
       best = minloc(forecast, dim=1)
       choice%tried = .true.
@@ -94,8 +93,8 @@ contains
       text = 'chosen by the case'
       if (.not. self%automatic) return
       text = 'auto: no vibrations'
-      if (self%frequency > 0.0_wp) text = 'auto: frequencies to '//short(self%frequency)//' rad/s'
-      if (self%decay > 0.0_wp) text = text//', dampers to '//short(self%decay)//' 1/s'
+      if (self%rates%frequency > 0.0_wp) text = 'auto: frequencies to '//short(self%rates%frequency)//' rad/s'
+      if (self%rates%decay > 0.0_wp) text = text//', dampers to '//short(self%rates%decay)//' 1/s'
       if (self%method == 'dop853') then
          text = text//': explicit, order 8, about '//whole(self%steps)//' steps'
       else if (self%method == 'gauss') then
@@ -109,30 +108,72 @@ contains
       end if
    end function reason
 
-   !> Efforts of explicit steps of order 8 and of collocation, by what a unit of phase of the fastest vibration costs at the
-   !> user's tolerance. The phases of their steps are those of table 1 (docs/performance.md); they change little from scene
-   !> to scene. Collocation is out of the question (huge) where it has no lanes or hinges have events, or where dampers are
-   !> faster than vibrations.
-   function expected_efforts(scene, options, frequency, decay, t_end) result(effort)
+   !> Ratio of the fastest rate to the highest frequency of the chain from where implicit steps may pay. They need not follow
+   !> vibrations below the tolerance, but the motion of the chain, with steps that shrink as the tolerance does.
+   pure real(wp) function stiff_from(rtol, rates)
+      real(wp), intent(in) :: rtol
+      type(fast_rates), intent(in) :: rates
+      stiff_from = merge(12.0_wp, 40.0_wp, rates%decay > 2.0_wp*rates%frequency)*(1.0e-3_wp/rtol)**0.25_wp
+   end function stiff_from
+
+   !> Efforts of explicit steps of order 8 and of collocation, by their steps (docs/performance.md). What the fast vibrations add
+   !> to the motion of the chain is nearly linear, so the faster they are, the fewer iterations a step of collocation needs.
+   !> It is out of the question (huge) where it has no lanes or modes or hinges have events, or where dampers are much faster
+   !> than vibrations.
+   function expected_efforts(scene, options, rates, ratio, t_end) result(effort)
       type(scene_type), intent(in) :: scene
       type(solver_options), intent(in) :: options
-      real(wp), intent(in) :: frequency, decay, t_end
+      type(fast_rates), intent(in) :: rates
+      real(wp), intent(in) :: ratio !! fastest rate over the frequencies of the chain; 1: unknown, or rods are rigid
+      real(wp), intent(in) :: t_end
       real(wp) :: effort(n_even)
-      real(wp) :: explicit_phase, radians
+      real(wp) :: iterations
 
-      radians = frequency*t_end
-      explicit_phase = vibration_limit*min(1.0_wp, (1.0e4_wp*options%rtol)**0.125_wp)
-      effort(1) = (stages + 1.0_wp)*max(radians/explicit_phase, decay*t_end/stability_limit)
+      effort(1) = explicit_step*expected_steps('dop853', options, rates, t_end)
       effort(2) = huge(1.0_wp)
-      if (scene%assembled .or. scene%n_q > scene%n_dof .or. decay > frequency .or. size(scene%hinges%mechanisms) > 0) return
-      effort(2) = first_search*scene%n_dof + iterations*effort_of_nodes(scene)*radians/collocation_phase(options%rtol)
+      if (scene%assembled .or. scene%n_q > scene%n_dof .or. scene%n_dof > most_dof .or. size(scene%hinges%mechanisms) > 0) return
+      if (rates%decay > 3.0_wp*rates%frequency) return
+      iterations = 4.5_wp
+      if (ratio > 1.0_wp) iterations = max(1.2_wp, 8.0_wp*ratio**(-0.2_wp)) + 2.0_wp*(1.0_wp - vibrating(rates, t_end))
+      if (strongly_damped(rates)) iterations = 9.0_wp
+      effort(2) = effort_of_modes(scene, 2) + &
+                  (collocation_step + iterations*effort_of_nodes(scene))*expected_steps('gauss', options, rates, t_end)
    end function expected_efforts
 
-   !> Phase of the fastest vibration in a collocation step.
-   pure real(wp) function collocation_phase(rtol)
-      real(wp), intent(in) :: rtol
-      collocation_phase = 9.0_wp*min(1.0_wp, (1.0e4_wp*rtol)**0.0625_wp)
-   end function collocation_phase
+   !> Steps of a run by a method that follows vibrations: of so many radians of the fastest, while it lasts; later as many as
+   !> stability or the motion of the chain allow.
+   pure real(wp) function expected_steps(method, options, rates, t_end) result(steps)
+      character(len=*), intent(in) :: method
+      type(solver_options), intent(in) :: options
+      type(fast_rates), intent(in) :: rates
+      real(wp), intent(in) :: t_end
+      real(wp) :: phase, later, share
+
+      share = vibrating(rates, t_end)
+      if (method == 'gauss') then
+         phase = 8.0_wp*min(1.0_wp, (1.0e4_wp*options%rtol)**0.0625_wp)
+         later = merge(13.0_wp, 20.0_wp, strongly_damped(rates))
+      else
+         phase = 3.0_wp*min(1.0_wp, (1.0e4_wp*options%rtol)**0.125_wp)
+         later = 5.5_wp
+      end if
+      steps = rates%frequency*t_end*(share/phase + (1.0_wp - share)/later)
+      if (method == 'dop853') steps = max(steps, rates%decay*t_end/stability_limit)
+   end function expected_steps
+
+   !> Dampers about as fast as vibrations, which collocation iterates on.
+   pure logical function strongly_damped(rates)
+      type(fast_rates), intent(in) :: rates
+      strongly_damped = rates%decay > 0.5_wp*rates%frequency
+   end function strongly_damped
+
+   !> Share of a run in which fast vibrations last: dampers leave them below tolerance after some time.
+   pure real(wp) function vibrating(rates, t_end)
+      type(fast_rates), intent(in) :: rates
+      real(wp), intent(in) :: t_end
+      vibrating = 1.0_wp
+      if (rates%decay*t_end > lasting) vibrating = lasting/(rates%decay*t_end)
+   end function vibrating
 
    !> Three digits.
    function short(value) result(text)

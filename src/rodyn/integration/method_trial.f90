@@ -12,7 +12,8 @@ module rodyn_method_trial
    use rodyn_integrators, only: new_integrator
    implicit none (type, external)
    private
-   public :: candidate_type, candidates, n_even, effort_of, effort_of_nodes, try_methods
+   public :: fast_rates, candidate_type, candidates, n_even, effort_of, effort_of_nodes, effort_of_modes, &
+      collocation_step, explicit_step, try_methods
 
    !> A method, with the highest order if it is not the usual one.
    type :: candidate_type
@@ -25,11 +26,18 @@ module rodyn_method_trial
       candidate_type('bdf', 0), candidate_type('bdf', 2)]
    integer, parameter :: n_even = 2 !! the first of them follow all vibrations, at a rather even pace; the very first is explicit
 
-   real(wp), parameter :: first_effort = 400.0_wp     !! of a candidate, doubled from round to round
-   real(wp), parameter :: even_effort = 3000.0_wp     !! are enough to know the pace of methods that follow all vibrations
-   real(wp), parameter :: clear_lead = 4.0_wp         !! of an implicit method, with which the trial ends
-   real(wp), parameter :: own_share = 0.2_wp         !! of its own run that the best candidate is tried on
-   real(wp), parameter :: sure_lead = 12.0_wp         !! of one over expectations, which may be wrong by 3
+   real(wp), parameter :: collocation_step = 4.0_wp   !! effort of a collocation step beside its iterations
+   real(wp), parameter :: first_effort = 400.0_wp     !! of a candidate, doubled from round to round; or `first_share` of the run
+   real(wp), parameter :: first_share = 0.1_wp
+   real(wp), parameter :: even_steps = 200.0_wp       !! are enough to know the pace of methods that follow all vibrations
+   real(wp), parameter :: explicit_step = 13.5_wp     !! effort of an explicit step, rejected ones included
+   real(wp), parameter :: clear_lead = 3.0_wp         !! with which another need not go on
+   real(wp), parameter :: own_share = 0.2_wp          !! of its own run that the best candidate is tried on
+   real(wp), parameter :: even_share = 0.5_wp         !! of the run of the best even method, likewise
+   real(wp), parameter :: expectation_error = 3.0_wp  !! factor by which expectations may be wrong
+   real(wp), parameter :: even_trial = 0.1_wp         !! of its run that an even method is tried on
+   real(wp), parameter :: bounded = 0.7_wp            !! phase in a step of BDF above order 2 that vibrations hold back
+   real(wp), parameter :: damped = 0.03_wp            !! decay over frequency from where fast vibrations are damped
 
    !> Passes on that someone wants an end, and no more: what a trial reports is not the run.
    type, extends(monitor_type) :: trial_monitor
@@ -39,81 +47,95 @@ module rodyn_method_trial
       procedure :: stop_requested
    end type trial_monitor
 
+   !> The fast end of a scene's spectrum.
+   type :: fast_rates
+      real(wp) :: frequency = 0.0_wp !! highest natural frequency [rad/s]
+      real(wp) :: decay = 0.0_wp     !! fastest decay [1/s]
+   end type fast_rates
+
    !> A run that can be continued; started when first continued.
    type :: runner
       type(motion_type), pointer :: motion => null()
       class(integrator_type), allocatable :: integrator
       real(wp) :: effort = 0.0_wp  !! spent
+      real(wp) :: begun = 0.0_wp   !! of that before the first step
       real(wp) :: reached = 0.0_wp !! [s]
       real(wp) :: pace = 0.0_wp    !! simulated time for an effort of 1 in the last round [s]
-      real(wp) :: growth(2) = 1.0_wp !! of the pace, in the last round and the one before
+      real(wp) :: growth = 1.0_wp  !! of the pace, in the last round
       logical :: failed = .false.
    end type runner
 
 contains
 
-   !> Effort of a run: that of one right-hand side is 1. Beside them, an implicit step solves as often, which takes as
-   !> long, has a new Jacobian or factors now and then, and adds vectors: 2, and what does not grow with n.
+   !> Effort of a run: that of one right-hand side of `dop853` is 1. Beside right-hand sides, an implicit step solves as often,
+   !> which takes as long, has a new Jacobian or factors now and then, and adds vectors: 2, and what does not grow with n.
    pure real(wp) function effort_of(method, scene, stats)
       character(len=*), intent(in) :: method
       type(scene_type), intent(in) :: scene
       type(solver_statistics), intent(in) :: stats
       effort_of = real(stats%n_rhs, wp)
       if (method == 'gauss') effort_of = real(stats%n_rhs, wp)/real(lanes, wp)*effort_of_nodes(scene) + &
-                                         10.0_wp*scene%n_dof*real(stats%n_jac, wp)
-      if (method == 'bdf') effort_of = 2.2_wp*real(stats%n_rhs, wp) + 3.0_wp*real(stats%n_jac, wp) + &
-                                       real(stats%n_steps, wp)*(2.2_wp + 20.0_wp/(1.0_wp + 0.37_wp*scene%n))
+                                         collocation_step*real(stats%n_steps, wp) + effort_of_modes(scene, int(stats%n_jac))
+      if (method == 'bdf') effort_of = 2.1_wp*real(stats%n_rhs, wp) + 3.0_wp*real(stats%n_jac, wp) + &
+                                       real(stats%n_steps, wp)*(2.1_wp + 15.0_wp/(1.0_wp + 0.37_wp*scene%n))
    end function effort_of
 
    !> Effort of one iteration of a collocation step: eight right-hand sides in lanes, and the stiff modes, whose cost grows
-   !> with the square of the number of unknowns (measured from 7 to 195 of them).
+   !> with the square of the number of unknowns (measured from 6 to 195 of them).
    pure real(wp) function effort_of_nodes(scene)
       type(scene_type), intent(in) :: scene
-      effort_of_nodes = 4.5_wp + 0.18_wp*scene%n_dof
+      effort_of_nodes = 3.4_wp + 0.055_wp*scene%n_dof
    end function effort_of_nodes
+
+   !> Effort of finding the modes so many times: the first has no guess.
+   pure real(wp) function effort_of_modes(scene, times)
+      type(scene_type), intent(in) :: scene
+      integer, intent(in) :: times
+      effort_of_modes = 0.4_wp*real(scene%n_dof, wp)**2 + 6.0_wp*scene%n_dof*times
+   end function effort_of_modes
 
    !> Effort that each candidate would need from 0 to `t_end`, huge if it fails. An implicit method may creep at first,
    !> until vibrations it does not follow have died out. So its pace is that of the last round; that of order 2, which no
-   !> vibration holds back, may go on growing.
+   !> vibration holds back for ever, may go on growing.
    !>
-   !> The pace of the even methods is known well enough beforehand where implicit ones leave them far behind. Only where
-   !> they do not, the even ones are tried, with no more effort than the best implicit method needs for the whole run.
-   subroutine try_methods(scene, y, options, t_first, t_end, expected, share, forecast, effort, monitor)
+   !> The implicit methods are tried with efforts that double from round to round. One that has nothing left to hope for drops out,
+   !> and the trial ends when the best has a share of its run behind it. The pace of the even methods is known to a factor of 3
+   !> beforehand; only where that leaves a doubt at the end they are tried, too.
+   subroutine try_methods(scene, y, options, t_first, t_end, rates, expected, forecast, effort, monitor)
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: y(:)                  !! state at t = 0, without quadratures
       type(solver_options), intent(in) :: options
       real(wp), intent(in) :: t_first               !! end of the trial at the latest; no load switches before [s]
       real(wp), intent(in) :: t_end                 !! [s]
+      type(fast_rates), intent(in) :: rates
       real(wp), intent(in) :: expected(n_even)      !! effort of the even methods; huge: of no use here
-      real(wp), intent(in) :: share                 !! of the effort of the best even method, for one candidate at most, but
-                                                    !! not more than `most_effort`
       real(wp), intent(out) :: forecast(size(candidates))
       real(wp), intent(out) :: effort               !! spent on the trial
       class(monitor_type), target, intent(inout), optional :: monitor !! may end the trial, which then tells nothing
       type(trial_monitor), target :: listener
       type(runner) :: runners(size(candidates))
-      real(wp) :: allowed, budget
+      real(wp) :: first, allowed, budget
       integer :: i, best
+      logical :: over
 
       if (present(monitor)) listener%outer => monitor
       forecast(:n_even) = expected
-      allowed = first_effort
+      forecast(n_even + 1:) = huge(1.0_wp)
+      first = min(first_effort, first_share*minval(expected))
+      allowed = first
       do
          do i = n_even + 1, size(candidates)
-            if (hopeless(runners(i), candidates(i), t_end/forecast(1))) cycle
+            if (outdone(i)) cycle
             call continue_runner(runners(i), candidates(i), scene, y, options, t_first, allowed, listener)
-            forecast(i) = forecast_of(runners(i), t_end, candidates(i)%order == 2 .and. allowed > 3.0_wp*first_effort)
+            forecast(i) = forecast_of(runners(i), t_end, candidates(i)%order == 2 .and. allowed > 3.0_wp*first)
          end do
          best = n_even + minloc(forecast(n_even + 1:), dim=1)
-         if (sure_lead*forecast(best) > minval(expected) .and. &
-             (allowed > 3.0_wp*first_effort .or. any(runners%reached >= t_first))) call try_even()
-         if (any(runners%reached >= t_first) .or. all(runners(n_even + 1:)%failed)) exit
-         budget = share*minval(forecast(:n_even))
-         if (forecast(best) < minval(forecast(:n_even))) budget = min(budget, own_share*forecast(best))
-         budget = min(budget, most_effort(scene))
-         if (1.4_wp*allowed >= budget) exit ! a short round would tell nothing
-         if (allowed > 3.0_wp*first_effort .and. clear_lead*forecast(best) < &
-             minval(forecast, mask=[(i /= best, i=1, size(candidates))])) exit
+         over = any(runners%reached >= t_first) .or. all([(outdone(i), i=n_even + 1, size(candidates))])
+         if (over .or. is_spent()) then
+            if (any(runners(:n_even)%effort > 0.0_wp)) exit
+            call try_even()
+            if (over .or. is_spent()) exit
+         end if
          allowed = min(2.0_wp*allowed, budget)
       end do
       effort = sum(runners%effort)
@@ -124,32 +146,99 @@ contains
 
    contains
 
+      !> Whether the trial has had its share of the run, or another round would be too short to tell anything. One that may
+      !> still become unstable has to show its whole run.
+      logical function is_spent()
+         budget = min(most_effort(scene), even_share*minval(forecast(:n_even)))
+         if (forecast(best) < minval(forecast(:n_even)) .and. .not. order_is_risky(best)) &
+            budget = min(budget, own_share*forecast(best))
+         is_spent = 1.4_wp*allowed >= budget
+      end function is_spent
+
+      !> Sharpen the forecasts of the even methods that may be the best, if that is not settled and they are worth it.
       subroutine try_even()
+         logical :: contends(size(candidates))
+         real(wp) :: most, start, a_step
          integer :: j
+         contends = forecast/expectation_error <= minval(forecast)
+         if (count(contends) < 2) return
          do j = 1, n_even
-            if (expected(j) > sure_lead*minval(expected) .or. runners(j)%effort > max(even_effort, 0.25_wp*allowed)) cycle
-            call continue_runner(runners(j), candidates(j), scene, y, options, t_first, &
-                                 min(allowed, max(first_effort, forecast(best))), listener)
+            if (.not. contends(j)) cycle
+            a_step = explicit_step
+            start = 0.0_wp
+            if (candidates(j)%method == 'gauss') then
+               a_step = collocation_step + 2.0_wp*effort_of_nodes(scene)
+               start = effort_of_modes(scene, 2)
+            end if
+            if (start > 2.0_wp*even_trial*expected(j)) cycle
+            most = min(even_steps*a_step, even_trial*expected(j))
+            call continue_runner(runners(j), candidates(j), scene, y, options, t_first, 0.4_wp*most, listener)
+            call continue_runner(runners(j), candidates(j), scene, y, options, t_first, most, listener)
             forecast(j) = forecast_of(runners(j), t_end, .false.)
+            ! Explicit steps bound by dampers cost what is known beforehand, once the first vibrations have died out.
+            if (j == 1 .and. rates%decay > rates%frequency) forecast(j) = min(forecast(j), expected(j))
          end do
       end subroutine try_even
 
+      !> Whether an implicit method has failed, or has nothing left to hope for.
+      logical function outdone(j)
+         integer, intent(in) :: j
+         real(wp) :: rival, hope
+         integer :: k
+         outdone = runners(j)%failed
+         if (outdone .or. .not. runners(j)%effort > 0.0_wp) return
+         outdone = order_is_risky(j) .and. phase_of(runners(j), rates) < bounded
+         if (outdone .or. runners(j)%effort < 3.0_wp*first .or. runners(j)%growth > 1.2_wp) return
+         rival = minval(forecast, mask=[(k /= j .and. k > n_even, k=1, size(candidates))])
+         do k = 1, n_even
+            rival = min(rival, merge(forecast(k), expectation_error*min(forecast(k), 1.0e30_wp), runners(k)%effort > 0.0_wp))
+         end do
+         hope = forecast(j)/clear_lead
+         if (candidates(j)%order == 2) hope = min(hope, runners(j)%effort + dying_out(runners(j), rates))
+         outdone = hope > rival
+      end function outdone
+
+      !> BDF above order 2 is unstable for vibrations without dampers where its steps are longer than some half a radian, which
+      !> shows as late as they have grown from nothing.
+      logical function order_is_risky(j)
+         integer, intent(in) :: j
+         order_is_risky = candidates(j)%order == 0 .and. rates%decay < damped*rates%frequency
+      end function order_is_risky
+
    end subroutine try_methods
+
+   !> Phase of the fastest vibration in a step of the last round.
+   pure real(wp) function phase_of(self, rates)
+      type(runner), intent(in) :: self
+      type(fast_rates), intent(in) :: rates
+      phase_of = rates%frequency*self%pace*per_step(self)
+   end function phase_of
+
+   !> Effort of a step.
+   pure real(wp) function per_step(self)
+      type(runner), intent(in) :: self
+      per_step = explicit_step
+      if (.not. allocated(self%integrator)) return
+      if (self%integrator%n_steps > 0) per_step = (self%effort - self%begun)/real(self%integrator%n_steps, wp)
+   end function per_step
+
+   !> Effort until vibrations have died out that hold back the steps of BDF of order 2. A step h damps a vibration of frequency w
+   !> by (h w)^4/4, and the tolerance allows h ~ amplitude^(-1/3); both together let it vanish after 3/(h w)^4 steps, with today's
+   !> h. The slower vibrations of rods last longer than the fastest: 15 to 46 times in chains of like rods. 0: unknown.
+   real(wp) function dying_out(self, rates)
+      type(runner), intent(in) :: self
+      type(fast_rates), intent(in) :: rates
+      real(wp), parameter :: slower = 15.0_wp
+      dying_out = 0.0_wp
+      if (rates%decay > damped*rates%frequency .or. .not. self%pace > 0.0_wp) return ! dampers are at work, too
+      dying_out = slower*3.0_wp/max(1.0e-3_wp, min(0.4_wp, phase_of(self, rates)))**4*per_step(self)
+   end function dying_out
 
    !> However long the run: what a candidate may spend in about a second, since a trial says nothing and cannot be stopped.
    pure real(wp) function most_effort(scene)
       type(scene_type), intent(in) :: scene
       most_effort = 5.0e6_wp/(1.0_wp + 0.37_wp*scene%n)
    end function most_effort
-
-   !> An implicit method that vibrations hold back goes on at its even pace.
-   pure logical function hopeless(self, candidate, explicit_pace)
-      type(runner), intent(in) :: self
-      type(candidate_type), intent(in) :: candidate
-      real(wp), intent(in) :: explicit_pace
-      hopeless = candidate%method == 'bdf' .and. candidate%order == 0 .and. self%effort > 2.0_wp*even_effort .and. &
-                 2.0_wp*self%pace < explicit_pace .and. self%growth(1) < 1.1_wp
-   end function hopeless
 
    !> Effort to the end if the pace stays, or goes on growing as it did.
    pure real(wp) function forecast_of(self, t_end, grows)
@@ -163,7 +252,7 @@ contains
       if (self%failed .or. .not. self%pace > 0.0_wp) return
       forecast_of = self%effort
       reached = self%reached
-      growth = merge(max(1.0_wp, min(most_growth, minval(self%growth))), 1.0_wp, grows)
+      growth = merge(max(1.0_wp, min(most_growth, self%growth)), 1.0_wp, grows)
       pace = self%pace
       do while (reached < t_end)
          pace = pace*growth
@@ -219,18 +308,20 @@ contains
       integer, parameter :: n_slices = 4 ! a slice too long costs no more than a quarter of what is allowed
       type(error_type), allocatable :: error
       type(solver_statistics) :: stats
-      real(wp) :: state(size(y)), per_step, effort_before, reached_before, pace_before
+      real(wp) :: state(size(y)), effort_before, reached_before, pace_before
       integer :: steps
 
-      if (.not. associated(self%motion)) call start_runner(self, candidate, scene, y, options, t_end, listener)
+      if (.not. associated(self%motion)) then
+         call start_runner(self, candidate, scene, y, options, t_end, listener)
+         if (.not. self%failed) self%begun = effort_of(candidate%method, scene, self%integrator%statistics())
+         self%effort = self%begun
+      end if
       effort_before = self%effort
       reached_before = self%reached
       pace_before = self%pace
-      do while (.not. self%failed .and. self%reached < t_end .and. self%effort < 0.9_wp*allowed)
+      do while (.not. self%failed .and. self%reached < t_end .and. self%effort - self%begun < 0.9_wp*allowed)
          stats = self%integrator%statistics()
-         per_step = 14.0_wp
-         if (stats%n_steps > 0) per_step = self%effort/real(stats%n_steps, wp)
-         steps = max(5, int(min((allowed - self%effort)/per_step, allowed/(n_slices*per_step))))
+         steps = max(5, int(min(allowed - (self%effort - self%begun), allowed/n_slices)/per_step(self)))
          self%integrator%options%max_steps = int(stats%n_steps) + steps
          call self%integrator%advance(t_end, state, self%reached, error)
          stats = self%integrator%statistics()
@@ -240,7 +331,7 @@ contains
       end do
       if (.not. self%effort > effort_before) return
       self%pace = (self%reached - reached_before)/(self%effort - effort_before)
-      if (pace_before > 0.0_wp) self%growth = [self%pace/pace_before, self%growth(1)]
+      if (pace_before > 0.0_wp) self%growth = self%pace/pace_before
    end subroutine continue_runner
 
    !> Go on behind an event.
