@@ -20,7 +20,7 @@ module rodyn_gauss_integrator
    use rodyn_ode, only: ode_system, mechanical_system, stiff_modes
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, time_text
    use rodyn_trigonometry, only: sine_cosine
-   use rodyn_lane_algebra, only: apply, apply_one, apply_both, multiply, project, project_pair, expand, combine, square_sums, &
+   use rodyn_lane_algebra, only: apply, apply_one, multiply, project, project_pair, expand, combine, square_sums, &
       straight_lines, residual, add, accumulate, copy
    use rodyn_gauss_collocation, only: gauss_collocation, new_gauss_collocation
    implicit none (type, external)
@@ -489,8 +489,8 @@ contains
       associate (m => self%mechanics%n_dof, base => self%mechanics%n_ignorable, h => record%h)
          call straight_lines(m, self%y_before, self%y_before(m + 1:), h, self%rule%c, record%q)
          call straight_lines(m, self%y_before(m + 1:), self%y_before(m + 1:), 0.0_wp, self%rule%c, record%p)
-         call apply_both(m - base, h*self%rule%a, h**2*self%rule%a2, record%f(:, base + 1:), record%p(:, base + 1:), &
-                         record%q(:, base + 1:))
+         call apply(m - base, h*self%rule%a, record%f(:, base + 1:), record%p(:, base + 1:))
+         call apply(m - base, h**2*self%rule%a2, record%f(:, base + 1:), record%q(:, base + 1:))
       end associate
    end subroutine restore_nodes
 
@@ -600,9 +600,8 @@ contains
       class(gauss_integrator), intent(inout) :: self
       real(wp), contiguous, intent(in) :: df(:, :)
       associate (m => self%mechanics%n_dof, base => self%mechanics%n_ignorable)
-         call apply(base, self%now%h_a, df, self%trial%p)
-         call apply_both(m - base, self%now%h_a, self%now%h2_a2, df(:, base + 1:), self%trial%p(:, base + 1:), &
-                         self%trial%q(:, base + 1:))
+         call apply(m, self%now%h_a, df, self%trial%p)
+         call apply(m - base, self%now%h2_a2, df(:, base + 1:), self%trial%q(:, base + 1:))
       end associate
    end subroutine move_nodes
 

@@ -1,44 +1,23 @@
 !> Small linear algebra on values at all lanes, x(lanes, n): each operation on a lane vector is one vector instruction.
 !>
-!> The lanes stand in explicit shapes, so that the compiler knows their number. Sums of three columns at a time stay in
-!> registers, and none waits for the other; chains of flexible rods have columns in threes.
+!> The lanes stand in explicit shapes, so that the compiler knows their number. Products of matrices (`expand`) keep four columns in
+!> registers while the others go by, since gfortran would load a column again for each product.
 module rodyn_lane_algebra
    use rodyn_kinds, only: wp
    use rodyn_lanes, only: s => lanes
    implicit none (type, external)
    private
-   public :: apply, apply_one, apply_both, multiply, project, project_pair, expand, combine, square_sums, straight_lines, &
+   public :: apply, apply_one, multiply, project, project_pair, expand, combine, square_sums, straight_lines, &
       residual, add, accumulate, copy
 
 contains
 
-   !> y(:, j) = y(:, j) + A x(:, j). Without the inner loop A stays in registers while x and y go by.
+   !> y(:, j) = y(:, j) + A x(:, j).
    pure subroutine apply(n, a, x, y)
       integer, intent(in) :: n
       real(wp), intent(in) :: a(s, s), x(s, n)
       real(wp), intent(inout) :: y(s, n)
-      real(wp), dimension(s) :: y_1, y_2, y_3
-      integer :: i, j, l
-      do j = 1, n - 2, 3
-         y_1 = y(:, j)
-         y_2 = y(:, j + 1)
-         y_3 = y(:, j + 2)
-         !GCC$ unroll 8
-         do i = 1, s
-            !$omp simd
-            do l = 1, s
-               y_1(l) = y_1(l) + a(l, i)*x(i, j)
-               y_2(l) = y_2(l) + a(l, i)*x(i, j + 1)
-               y_3(l) = y_3(l) + a(l, i)*x(i, j + 2)
-            end do
-         end do
-         y(:, j) = y_1
-         y(:, j + 1) = y_2
-         y(:, j + 2) = y_3
-      end do
-      do j = n - modulo(n, 3) + 1, n
-         call apply_one(a, x(:, j), y(:, j))
-      end do
+      call expand(n, s, s, x, a, y)
    end subroutine apply
 
    !> y(:, j) = A x(:, j).
@@ -64,45 +43,6 @@ contains
       end do
       y = sum_1 + sum_2
    end subroutine apply_one
-
-   !> y(:, j) = y(:, j) + A x(:, j) and z(:, j) = z(:, j) + B x(:, j), likewise.
-   pure subroutine apply_both(n, a, b, x, y, z)
-      integer, intent(in) :: n
-      real(wp), intent(in) :: a(s, s), b(s, s), x(s, n)
-      real(wp), intent(inout) :: y(s, n), z(s, n)
-      real(wp), dimension(s) :: y_1, y_2, y_3, z_1, z_2, z_3
-      integer :: i, j, l
-      do j = 1, n - 2, 3
-         y_1 = y(:, j)
-         y_2 = y(:, j + 1)
-         y_3 = y(:, j + 2)
-         z_1 = z(:, j)
-         z_2 = z(:, j + 1)
-         z_3 = z(:, j + 2)
-         !GCC$ unroll 8
-         do i = 1, s
-            !$omp simd
-            do l = 1, s
-               y_1(l) = y_1(l) + a(l, i)*x(i, j)
-               y_2(l) = y_2(l) + a(l, i)*x(i, j + 1)
-               y_3(l) = y_3(l) + a(l, i)*x(i, j + 2)
-               z_1(l) = z_1(l) + b(l, i)*x(i, j)
-               z_2(l) = z_2(l) + b(l, i)*x(i, j + 1)
-               z_3(l) = z_3(l) + b(l, i)*x(i, j + 2)
-            end do
-         end do
-         y(:, j) = y_1
-         y(:, j + 1) = y_2
-         y(:, j + 2) = y_3
-         z(:, j) = z_1
-         z(:, j + 1) = z_2
-         z(:, j + 2) = z_3
-      end do
-      do j = n - modulo(n, 3) + 1, n
-         call apply_one(a, x(:, j), y(:, j))
-         call apply_one(b, x(:, j), z(:, j))
-      end do
-   end subroutine apply_both
 
    !> z(:, i) = sum_j v(j, i) x(:, j).
    pure subroutine project(n, m, v, x, z)
