@@ -57,7 +57,8 @@ def measure(part: str) -> None:
     else:
         text = output_of([example(), part])
     if part == "orders":
-        (RESULTS / "orders_quad.txt").write_text(output_of([wide_program("quadruple", QUAD_ORDERS, QUAD_ORDERS.parent)], output_of([example(), "tableaux"])))
+        program = wide_program("quadruple", QUAD_ORDERS, QUAD_ORDERS.parent)
+        (RESULTS / "orders_quad.txt").write_text(output_of([program], output_of([example(), "tableaux"])))
     (RESULTS / f"{part}.txt").write_text(text)
 
 

@@ -7,7 +7,7 @@ module rodyn_lapack
    implicit none (type, external)
    private
    public :: use_one_thread, symmetric_eigenvalues
-   public :: dpotrf, dpotrs, dgesv, dgetrf, dgetrs, dsyev, dgeev, dgemv, dgemm, dtrsm
+   public :: dpotrf, dpotrs, dgesv, dgetrf, dgetrs, dsyev, dgeev, dgemv, dtrsm
 
    interface
       !> Cholesky factors of a symmetric positive definite matrix.
@@ -110,17 +110,6 @@ module rodyn_lapack
          real(wp), intent(inout) :: work(*)
          integer, intent(out) :: info
       end subroutine dgeev
-
-      !> C <- alpha A B + beta C.
-      pure subroutine dgemm(transa, transb, m, n, k, alpha, a, lda, b, ldb, beta, c, ldc)
-         import :: wp
-         implicit none (type, external)
-         character(len=1), intent(in) :: transa, transb
-         integer, intent(in) :: m, n, k, lda, ldb, ldc
-         real(wp), intent(in) :: alpha, beta
-         real(wp), intent(in) :: a(lda, *), b(ldb, *)
-         real(wp), intent(inout) :: c(ldc, *)
-      end subroutine dgemm
 
       !> y <- alpha A x + beta y.
       pure subroutine dgemv(trans, m, n, alpha, a, lda, x, incx, beta, y, incy)

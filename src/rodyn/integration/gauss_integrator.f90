@@ -436,16 +436,16 @@ contains
    subroutine choose_degree(self)
       class(gauss_integrator), intent(inout) :: self
       real(wp) :: errors(size(degrees)), sums(s)
-      real(wp), dimension(s, s) :: a2, ahead
+      real(wp), dimension(s, s) :: minus_a2, ahead
       integer :: i, m
 
       m = self%mechanics%n_dof
+      minus_a2 = -self%rule%a2 ! an expression as an argument would allocate
       do i = 1, size(degrees)
          ahead = self%rule%interpolation(1.0_wp, self%now%h/self%last%h, degrees(i))
-         a2 = matmul(self%rule%a2, ahead)
-         call multiply(m, a2, self%last%smooth, self%guess)
-         a2 = -self%rule%a2
-         call apply(m, a2, self%trial%smooth, self%guess)
+         ahead = matmul(self%rule%a2, ahead)
+         call multiply(m, ahead, self%last%smooth, self%guess)
+         call apply(m, minus_a2, self%trial%smooth, self%guess)
          sums = square_sums(m, self%guess, self%weight)
          errors(i) = sum(sums)
       end do
