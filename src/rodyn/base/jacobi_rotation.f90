@@ -51,6 +51,9 @@ contains
    end subroutine rotate_rows
 
    !> Rotate columns of x until the parts b_i in its first m rows are (nearly) orthogonal, all other rows along with them.
+   !>
+   !> Pairs are taken as in a tournament in which each column plays each other: no rotation of a round waits for another one. What
+   !> a sweep leaves is about the square of what it found, so that the last one need not be looked at.
    pure subroutine orthogonalise_columns(x, m, smallest, negligible, squares)
       real(wp), contiguous, intent(inout) :: x(:, :)
       integer, intent(in) :: m
@@ -58,27 +61,33 @@ contains
       real(wp), intent(in) :: negligible   !! b_i.b_j, of the smaller square
       real(wp), intent(out) :: squares(:)  !! |b_i|^2 (columns)
       integer, parameter :: most_sweeps = 12
-      real(wp) :: product_ij, c, s
-      integer :: sweep, i, j
-      logical :: done
+      real(wp) :: product_ij, found, largest, c, s
+      integer :: sweep, round, pair, n, others, i, j
 
+      n = size(x, 2)
+      others = n - 1 + modulo(n, 2) ! an odd column has nobody to play with, once
       do sweep = 1, most_sweeps
-         do i = 1, size(x, 2)
+         do i = 1, n
             squares(i) = inner_product(m, x(:, i), x(:, i))
          end do
-         done = .true.
-         do j = 2, size(x, 2)
-            do i = 1, j - 1
+         largest = 0.0_wp
+         do round = 0, others - 1
+            do pair = 0, others/2
+               i = 1 + modulo(round + pair, others)
+               j = 1 + modulo(round - pair, others)
+               if (pair == 0) j = others + 1
+               if (j > n) cycle
                product_ij = inner_product(m, x(:, i), x(:, j))
-               if (abs(product_ij) <= negligible*max(smallest, min(squares(i), squares(j)))) cycle
-               done = .false.
+               found = abs(product_ij)/max(smallest, min(squares(i), squares(j)), tiny(1.0_wp))
+               if (found <= negligible) cycle
+               largest = max(largest, found)
                call jacobi_rotation(squares(i), squares(j), product_ij, c, s)
                call rotate_columns(x, i, j, c, s)
                squares(i) = squares(i) - s/c*product_ij
                squares(j) = squares(j) + s/c*product_ij
             end do
          end do
-         if (done) return
+         if (largest**2 <= negligible) return
       end do
    end subroutine orthogonalise_columns
 

@@ -25,7 +25,7 @@ module rodyn_gauss_collocation
                                                     !! minus twice the imaginary parts: f(A) = sum 2 Re(f(lambda_j) W_j)
    contains
       procedure :: interpolation
-      procedure :: function_of_a
+      procedure :: mode_reply
    end type gauss_collocation
 
 contains
@@ -97,8 +97,8 @@ contains
       real(wp), intent(in) :: start, length
       integer, intent(in), optional :: degree !! < s; absent: s - 1
       real(wp) :: matrix(s, s)
-      real(wp) :: p(s, 0:s - 1), x(s)
-      integer :: j, k, last
+      real(wp) :: p(s, 0:s - 1), x(s), column(s)
+      integer :: j, k, l, last
 
       last = s - 1
       if (present(degree)) last = degree
@@ -106,25 +106,38 @@ contains
       p(:, 0) = 1.0_wp
       p(:, 1) = x
       do k = 2, last
-         p(:, k) = ((2*k - 1)*x*p(:, k - 1) - (k - 1)*p(:, k - 2))*(1.0_wp/k)
+         !$omp simd
+         do l = 1, s
+            p(l, k) = ((2*k - 1)*x(l)*p(l, k - 1) - (k - 1)*p(l, k - 2))*(1.0_wp/k)
+         end do
       end do
       do j = 1, s
-         matrix(:, j) = self%coefficients(1, j)
+         column = self%coefficients(1, j)
          do k = 1, last
-            matrix(:, j) = matrix(:, j) + self%coefficients(k + 1, j)*p(:, k)
+            !$omp simd
+            do l = 1, s
+               column(l) = column(l) + self%coefficients(k + 1, j)*p(l, k)
+            end do
          end do
+         matrix(:, j) = column
       end do
    end function interpolation
 
-   !> The real matrix f(A) for given values of f at the eigenvalues in the upper half plane.
-   pure function function_of_a(self, values) result(matrix)
+   !> The real matrix (1 + x A + y A^2)^-1 - 1, by its values at the eigenvalues of A.
+   pure subroutine mode_reply(self, x, y, matrix)
       class(gauss_collocation), intent(in) :: self
-      complex(wp), intent(in) :: values(n_pairs)
-      real(wp) :: matrix(s, s)
-      real(wp) :: weight(2*n_pairs), column(s)
+      real(wp), intent(in) :: x, y
+      real(wp), intent(out) :: matrix(s, s)
+      real(wp) :: real_part(n_pairs), imaginary_part(n_pairs), weight(2*n_pairs), column(s)
       integer :: i, j, l
 
-      weight = [real(values, wp), aimag(values)]
+      associate (re => real(self%lambda, wp), im => aimag(self%lambda))
+         real_part = 1.0_wp + re*x + (re**2 - im**2)*y
+         imaginary_part = im*x + 2.0_wp*re*im*y
+      end associate
+      column(:n_pairs) = 1.0_wp/(real_part**2 + imaginary_part**2)
+      weight(:n_pairs) = real_part*column(:n_pairs) - 1.0_wp
+      weight(n_pairs + 1:) = -imaginary_part*column(:n_pairs)
       do i = 1, s
          column = 0.0_wp
          do j = 1, 2*n_pairs
@@ -135,6 +148,6 @@ contains
          end do
          matrix(:, i) = column
       end do
-   end function function_of_a
+   end subroutine mode_reply
 
 end module rodyn_gauss_collocation

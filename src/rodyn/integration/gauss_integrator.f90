@@ -28,14 +28,14 @@ module rodyn_gauss_integrator
    public :: gauss_integrator, new_gauss_integrator
 
    integer, parameter :: most_iterations = 15
-   real(wp), parameter :: iteration_error = 0.1_wp  !! of the tolerance that the iteration may leave
+   real(wp), parameter :: iteration_error = 0.05_wp !! of the tolerance that the iteration may leave
    real(wp), parameter :: error_constant = 0.5_wp   !! of the error estimate, see `error_estimate`
    real(wp), parameter :: wanted_estimate = 0.05_wp, largest_estimate = 0.7_wp !! of the error, in tolerances
    real(wp), parameter :: first_phase = 2.0_wp      !! fastest frequency times the first step
    real(wp), parameter :: smallest_phase = 0.4_wp  !! slower vibrations need no implicit treatment
    integer, parameter :: degrees(*) = [2, s - 1]   !! of the first guess
    integer, parameter :: degree_interval = 16      !! steps after which the degree is judged again
-   real(wp), parameter :: search_cost = 1.5_wp      !! finding modes, in iterations per unknown
+   real(wp), parameter :: search_cost = 1.0_wp      !! finding modes, in iterations per unknown
 
    ! The numbers of the method, made once: a sweep has thousands of integrators.
    type(gauss_collocation) :: made_rule
@@ -365,7 +365,6 @@ contains
    subroutine set_step(self, h)
       class(gauss_integrator), intent(inout) :: self
       real(wp), intent(in) :: h
-      complex(wp) :: x(s/2)
       integer :: i
 
       if (h == self%now%h) return
@@ -379,12 +378,9 @@ contains
          end if
          if (.not. allocated(self%now%g)) allocate (self%now%g(s, s, most))
       end associate
-      associate (lambda => self%rule%lambda)
-         do i = 1, self%modes%n
-            x = h*self%modes%damping(i)*lambda + (h**2*self%modes%omega_2(i))*lambda**2
-            self%now%g(:, :, i) = self%rule%function_of_a(-x/(1.0_wp + x))
-         end do
-      end associate
+      do i = 1, self%modes%n
+         call self%rule%mode_reply(h*self%modes%damping(i), h**2*self%modes%omega_2(i), self%now%g(:, :, i))
+      end do
    end subroutine set_step
 
    subroutine set_weights(self, y)
