@@ -84,7 +84,7 @@ contains
          scale_rate = maxval(abs(reference(a + 1:a + n)))
          do i_tolerance = 1, size(tolerances)
             call choose_method(choice, solver_config(), options_for(tolerances(i_tolerance)), scene, &
-                               spread(0.0_wp, 1, 2*scene%n_dof), t_end)
+                               spread(0.0_wp, 1, 2*scene%n_dof), t_end, n_chunks)
             chosen = choice%method
             if (choice%options%order > 0) write (chosen, '(a, 1x, i0)') choice%method, choice%options%order
             do i_method = 1, size(methods)

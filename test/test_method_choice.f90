@@ -37,8 +37,7 @@ contains
       type(unittest), allocatable, intent(out) :: suite(:)
       suite = [new_test('power iteration misses the fastest rates by a fifth in one of 500 scenes at most', test_fastest), &
                new_test('auto costs at most 1.5 times the best method, soft and stiff, damped and not', test_few), &
-               new_test('auto takes a method within 1.5 of the best in all but 3 of the benchmark''s scenes, which are within 2', &
-                        test_benchmark), &
+               new_test('auto takes a method within 1.5 of the best in the scenes of the benchmark', test_benchmark), &
                new_test('auto takes a method within 1.5 of the best in all but 3 of 24 scenes beside them, within 2.5 there', &
                         test_others)]
    end subroutine collect_method_choice
@@ -103,8 +102,7 @@ contains
       call check(error, record%scenes == 12 .and. record%missed == 0, record%summary())
    end subroutine test_few
 
-   !> All 60 scenes of 4 rods but those that take long, and the shorter ones of 16 and 64 rods. Measured: 124 scenes, 3 missed, the
-   !> worst by 1.65.
+   !> All 60 scenes of 4 rods but those that take long, and the shorter ones of 16 and 64 rods.
    subroutine test_benchmark(error)
       type(error_type), allocatable, intent(out) :: error
       real(wp), parameter :: bending(*) = [1.0e-2_wp, 1.0_wp, 1.0e2_wp, 1.0e4_wp, 1.0e6_wp]
@@ -124,7 +122,7 @@ contains
             end do
          end do
       end do
-      call check(error, record%scenes >= 120 .and. record%missed <= 3 .and. record%worst <= 2.0_wp, record%summary())
+      call check(error, record%scenes >= 120 .and. record%missed == 0, record%summary())
    end subroutine test_benchmark
 
    !> Between the points of the benchmark; sudden, and smooth at first: there BDF of higher order goes fast until it is unstable.
@@ -169,7 +167,7 @@ contains
       call new_scene(scene, config, error)
       if (allocated(error)) return
       options = solver_options(rtol=tolerance, atol=0.01_wp*tolerance)
-      call choose_method(choice, solver_config(), options, scene, spread(0.0_wp, 1, 2*scene%n_dof), record%t_end)
+      call choose_method(choice, solver_config(), options, scene, spread(0.0_wp, 1, 2*scene%n_dof), record%t_end, 1)
       call run(scene, choice%method, choice%options, record%t_end, longest_run/(1.0_wp + 0.37_wp*n), y, chosen)
       if (.not. chosen < huge(1.0_wp)) return
       record%scenes = record%scenes + 1

@@ -116,7 +116,8 @@ contains
          return
       end if
       call initial_state(motion, config%initial, result%y)
-      call choose_method(choice, config%solver, options_of(config), scene, result%y(:motion%n_controlled), times(size(times)))
+      call choose_method(choice, config%solver, options_of(config), scene, result%y(:motion%n_controlled), &
+                         times(size(times)), size(times))
       result%method = choice%method
       call check_fixed_step(choice%method, choice%options, scene, result%y, times(size(times)), error)
       if (.not. allocated(error)) call new_integrator(integrator, motion, choice%method, choice%options, error)

@@ -13,7 +13,7 @@ module rodyn_method_trial
    implicit none (type, external)
    private
    public :: fast_rates, candidate_type, candidates, n_even, effort_of, effort_of_nodes, effort_of_modes, &
-      collocation_step, explicit_step, try_methods
+      effort_of_output, collocation_step, explicit_step, try_methods
 
    !> A method, with the highest order if it is not the usual one.
    type :: candidate_type
@@ -33,6 +33,7 @@ module rodyn_method_trial
    real(wp), parameter :: explicit_step = 13.5_wp     !! effort of an explicit step, rejected ones included
    real(wp), parameter :: clear_lead = 3.0_wp         !! with which another need not go on
    real(wp), parameter :: own_share = 0.2_wp          !! of its own run that the best candidate is tried on
+   real(wp), parameter :: growing_share = 0.7_wp      !! likewise where its pace still grows
    real(wp), parameter :: even_share = 0.5_wp         !! of the run of the best even method, likewise
    real(wp), parameter :: expectation_error = 3.0_wp  !! factor by which expectations may be wrong
    real(wp), parameter :: even_trial = 0.1_wp         !! of its run that an even method is tried on
@@ -51,6 +52,9 @@ module rodyn_method_trial
    type :: fast_rates
       real(wp) :: frequency = 0.0_wp !! highest natural frequency [rad/s]
       real(wp) :: decay = 0.0_wp     !! fastest decay [1/s]
+      real(wp) :: slow = 0.0_wp      !! highest natural frequency of the chain, were its rods rigid; 0: unknown [rad/s]
+   contains
+      procedure :: strongly_damped
    end type fast_rates
 
    !> A run that can be continued; started when first continued.
@@ -62,10 +66,18 @@ module rodyn_method_trial
       real(wp) :: reached = 0.0_wp !! [s]
       real(wp) :: pace = 0.0_wp    !! simulated time for an effort of 1 in the last round [s]
       real(wp) :: growth = 1.0_wp  !! of the pace, in the last round
+      real(wp) :: growth_before = 1.0_wp !! in the round before
+      real(wp) :: ends(3) = 0.0_wp !! efforts at the ends of the last rounds
       logical :: failed = .false.
    end type runner
 
 contains
+
+   !> Dampers about as fast as vibrations, which collocation iterates on.
+   pure logical function strongly_damped(self)
+      class(fast_rates), intent(in) :: self
+      strongly_damped = self%decay > 0.5_wp*self%frequency
+   end function strongly_damped
 
    !> Effort of a run: that of one right-hand side of `dop853` is 1. Beside right-hand sides, an implicit step solves as often,
    !> which takes as long, has a new Jacobian or factors now and then, and adds vectors: 2, and what does not grow with n.
@@ -87,6 +99,15 @@ contains
       effort_of_nodes = 3.4_wp + 0.055_wp*scene%n_dof
    end function effort_of_nodes
 
+   !> Effort of a state between steps: a shorter step, of which collocation knows the first guess; BDF has a polynomial.
+   pure real(wp) function effort_of_output(method, scene)
+      character(len=*), intent(in) :: method
+      type(scene_type), intent(in) :: scene
+      effort_of_output = 11.0_wp
+      if (method == 'gauss') effort_of_output = 2.0_wp*effort_of_nodes(scene) + 0.3_wp*scene%n_dof
+      if (method == 'bdf') effort_of_output = 1.5_wp
+   end function effort_of_output
+
    !> Effort of finding the modes so many times: the first has no guess.
    pure real(wp) function effort_of_modes(scene, times)
       type(scene_type), intent(in) :: scene
@@ -96,12 +117,12 @@ contains
 
    !> Effort that each candidate would need from 0 to `t_end`, huge if it fails. An implicit method may creep at first,
    !> until vibrations it does not follow have died out. So its pace is that of the last round; that of order 2, which no
-   !> vibration holds back for ever, may go on growing.
+   !> vibration holds back for ever, goes on growing until they are calm.
    !>
    !> The implicit methods are tried with efforts that double from round to round. One that has nothing left to hope for drops out,
    !> and the trial ends when the best has a share of its run behind it. The pace of the even methods is known to a factor of 3
    !> beforehand; only where that leaves a doubt at the end they are tried, too.
-   subroutine try_methods(scene, y, options, t_first, t_end, rates, expected, forecast, effort, monitor)
+   subroutine try_methods(scene, y, options, t_first, t_end, rates, expected, t_quiet, forecast, effort, monitor)
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: y(:)                  !! state at t = 0, without quadratures
       type(solver_options), intent(in) :: options
@@ -109,6 +130,7 @@ contains
       real(wp), intent(in) :: t_end                 !! [s]
       type(fast_rates), intent(in) :: rates
       real(wp), intent(in) :: expected(n_even)      !! effort of the even methods; huge: of no use here
+      real(wp), intent(in) :: t_quiet               !! when dampers will have calmed the fastest vibrations [s]
       real(wp), intent(out) :: forecast(size(candidates))
       real(wp), intent(out) :: effort               !! spent on the trial
       class(monitor_type), target, intent(inout), optional :: monitor !! may end the trial, which then tells nothing
@@ -128,6 +150,8 @@ contains
             if (outdone(i)) cycle
             call continue_runner(runners(i), candidates(i), scene, y, options, t_first, allowed, listener)
             forecast(i) = forecast_of(runners(i), t_end, candidates(i)%order == 2 .and. allowed > 3.0_wp*first)
+            if (candidates(i)%order == 2 .and. grows_for_good(runners(i), rates)) &
+               forecast(i) = settled(runners(i), rates) + quiet(runners(i), rates, options%rtol, t_end)
          end do
          best = n_even + minloc(forecast(n_even + 1:), dim=1)
          over = any(runners%reached >= t_first) .or. all([(outdone(i), i=n_even + 1, size(candidates))])
@@ -136,7 +160,7 @@ contains
             call try_even()
             if (over .or. is_spent()) exit
          end if
-         allowed = min(2.0_wp*allowed, budget)
+         allowed = 2.0_wp*allowed
       end do
       effort = sum(runners%effort)
       do i = 1, size(runners)
@@ -146,13 +170,14 @@ contains
 
    contains
 
-      !> Whether the trial has had its share of the run, or another round would be too short to tell anything. One that may
+      !> Whether the trial has had its share of the run. One that may
       !> still become unstable has to show its whole run.
       logical function is_spent()
          budget = min(most_effort(scene), even_share*minval(forecast(:n_even)))
          if (forecast(best) < minval(forecast(:n_even)) .and. .not. order_is_risky(best)) &
-            budget = min(budget, own_share*forecast(best))
-         is_spent = 1.4_wp*allowed >= budget
+            budget = min(budget, merge(growing_share, own_share, candidates(best)%order == 2 .and. &
+                                       runners(best)%growth > 1.4_wp)*forecast(best))
+         is_spent = allowed >= budget
       end function is_spent
 
       !> Sharpen the forecasts of the even methods that may be the best, if that is not settled and they are worth it.
@@ -177,6 +202,10 @@ contains
             forecast(j) = forecast_of(runners(j), t_end, .false.)
             ! Explicit steps bound by dampers cost what is known beforehand, once the first vibrations have died out.
             if (j == 1 .and. rates%decay > rates%frequency) forecast(j) = min(forecast(j), expected(j))
+         end do
+         if (rates%strongly_damped() .or. minval(runners(:n_even)%reached) >= min(t_quiet, t_end)) return
+         do j = 1, n_even ! what was seen of these two are vibrations that dampers will calm: the rest is not dearer than expected
+            forecast(j) = min(forecast(j), expected(j))
          end do
       end subroutine try_even
 
@@ -237,7 +266,7 @@ contains
    !> However long the run: what a candidate may spend in about a second, since a trial says nothing and cannot be stopped.
    pure real(wp) function most_effort(scene)
       type(scene_type), intent(in) :: scene
-      most_effort = 5.0e6_wp/(1.0_wp + 0.37_wp*scene%n)
+      most_effort = 2.5e6_wp/(1.0_wp + 0.37_wp*scene%n) ! the last round may double it
    end function most_effort
 
    !> Effort to the end if the pace stays, or goes on growing as it did.
@@ -264,6 +293,36 @@ contains
          forecast_of = 2.0_wp*forecast_of
       end do
    end function forecast_of
+
+   !> Whether the growth of the pace is that of vibrations dying out: it has lasted two rounds, the last of which doubled the
+   !> effort.
+   logical function grows_for_good(self, rates)
+      type(runner), intent(in) :: self
+      type(fast_rates), intent(in) :: rates
+      grows_for_good = self%growth > 1.4_wp .and. self%growth_before > 1.3_wp .and. self%ends(3) > 1.8_wp*self%ends(2)
+   end function grows_for_good
+
+   !> Effort until the vibrations are calm that hold back the steps of BDF of order 2, h ~ amplitude^(-1/3). Dampers reduce the
+   !> amplitude exponentially in time, so that 1/h falls to zero linearly with the number of steps; the method itself, by
+   !> (h omega)^4/4 a step, so that 1/h^4 does. Where both act the square is about right. With the growth of the pace from one round
+   !> to the next that gives the end.
+   real(wp) function settled(self, rates)
+      type(runner), intent(in) :: self
+      type(fast_rates), intent(in) :: rates
+      real(wp) :: before, now !! the middle of the last two rounds
+      before = 0.5_wp*(self%ends(1) + self%ends(2))
+      now = 0.5_wp*(self%ends(2) + self%ends(3))
+      settled = max(self%effort, now + (now - before)/(self%growth**merge(1, 2, rates%decay > damped*rates%frequency) - 1.0_wp))
+   end function settled
+
+   !> Effort of BDF of order 2 on the rest of the run once vibrations are calm: some 11 steps for a radian of the chain's motion at
+   !> rtol = 1e-3, measured, and h^3 ~ rtol.
+   real(wp) function quiet(self, rates, rtol, t_end)
+      type(runner), intent(in) :: self
+      type(fast_rates), intent(in) :: rates
+      real(wp), intent(in) :: rtol, t_end
+      quiet = 11.0_wp*(1.0e-3_wp/rtol)**(1.0_wp/3.0_wp)*rates%slow*(t_end - self%reached)*per_step(self)
+   end function quiet
 
    subroutine start_runner(self, candidate, scene, y, options, t_end, listener)
       type(runner), intent(inout) :: self
@@ -330,7 +389,9 @@ contains
          self%failed = allocated(error) .and. self%reached < t_end .and. stats%n_steps < self%integrator%options%max_steps
       end do
       if (.not. self%effort > effort_before) return
+      self%ends = [self%ends(2), effort_before, self%effort]
       self%pace = (self%reached - reached_before)/(self%effort - effort_before)
+      self%growth_before = self%growth
       if (pace_before > 0.0_wp) self%growth = self%pace/pace_before
    end subroutine continue_runner
 

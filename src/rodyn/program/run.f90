@@ -83,7 +83,8 @@ contains
       motion%events%most = config%solver%max_events
       call initial_state(motion, config%initial, y)
       progress = new_progress(0.0_wp, config%t_end, silent)
-      call choose_method(choice, config%solver, options_of(config), scene, y(:motion%n_controlled), config%t_end, progress)
+      call choose_method(choice, config%solver, options_of(config), scene, y(:motion%n_controlled), config%t_end, &
+                         config%n_outputs, progress)
       call check_fixed_step(choice%method, choice%options, scene, y, config%t_end, error)
       if (allocated(error) .and. present(name)) error%message = name//': '//error%message
       if (allocated(error)) return

@@ -277,7 +277,8 @@ contains
       motion%events%most = config%solver%max_events
       call initial_state(motion, config%initial, y)
       monitor = new_monitor(sweep, pulse, clock_start, late)
-      call choose_method(choice, config%solver, options_of(config), scene, y, t_end, monitor)
+      call merge_times(config, sweep%probe_times, shape%outputs, times, keeper%probe_of, keeper%output_of)
+      call choose_method(choice, config%solver, options_of(config), scene, y, t_end, size(times), monitor)
       if (choice%tried) then
          if (monitor%stop_requested()) call raise(error, 'stopped on request at t = 0 s', exit_stopped)
          if (allocated(error)) return
@@ -288,7 +289,6 @@ contains
       keeper%validity = new_validity(scene, config%model%deflection_limit)
       keeper%n_rods = shape%n_rods
       keeper%keep_series = sweep%keep_series
-      call merge_times(config, sweep%probe_times, shape%outputs, times, keeper%probe_of, keeper%output_of)
    end subroutine prepare_case
 
    !> The lowest natural frequencies, rigid bodies and mechanisms left out.
