@@ -295,11 +295,13 @@ contains
    end function forecast_of
 
    !> Whether the growth of the pace is that of vibrations dying out: it has lasted two rounds, the last of which doubled the
-   !> effort.
+   !> effort. With strong dampers the pace grows for other reasons, too, and it must not slacken.
    logical function grows_for_good(self, rates)
       type(runner), intent(in) :: self
       type(fast_rates), intent(in) :: rates
-      grows_for_good = self%growth > 1.4_wp .and. self%growth_before > 1.3_wp .and. self%ends(3) > 1.8_wp*self%ends(2)
+      grows_for_good = min(self%growth, self%growth_before) > 1.2_wp .and. self%growth*self%growth_before > 1.65_wp .and. &
+                       self%ends(3) > 1.8_wp*self%ends(2)
+      if (rates%strongly_damped()) grows_for_good = grows_for_good .and. self%growth > 1.4_wp
    end function grows_for_good
 
    !> Effort until the vibrations are calm that hold back the steps of BDF of order 2, h ~ amplitude^(-1/3). Dampers reduce the
