@@ -104,7 +104,7 @@ contains
       character(len=*), intent(in) :: method
       type(scene_type), intent(in) :: scene
       effort_of_output = 11.0_wp
-      if (method == 'gauss') effort_of_output = 2.0_wp*effort_of_nodes(scene) + 0.3_wp*scene%n_dof
+      if (method == 'gauss') effort_of_output = 1.5_wp*effort_of_nodes(scene) + 0.3_wp*scene%n_dof ! one or two iterations
       if (method == 'bdf') effort_of_output = 1.5_wp
    end function effort_of_output
 
