@@ -49,7 +49,7 @@ contains
       ! (1 + A/2 + 9 A^2)^-1 - 1 through the eigenvalues, against its definition: times 1 + A/2 + 9 A^2 it is minus A/2 + 9 A^2.
       added = 0.5_wp*rule%a + 9.0_wp*matmul(rule%a, rule%a)
       call rule%mode_reply(0.5_wp, 9.0_wp, reply)
-      call check(error, maxval(abs(reply + matmul(reply, added) + added)) < 1.0e-9_wp, 'function of A')
+      call check(error, maxval(abs(reply + matmul(reply, added) + added)) < 1.0e-9_wp, 'mode_reply')
    end subroutine test_matrices
 
    subroutine test_kinds(error)

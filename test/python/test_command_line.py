@@ -634,3 +634,15 @@ def test_a_signal_stops_a_run_that_can_be_made_again(tmp_path: pathlib.Path, nam
         assert rows["time"].size > 0
     case.write_text(text.replace("t_end = 30 ", "t_end = 0.1 "))
     assert subprocess.run(command, capture_output=True, check=False).returncode == 0
+
+
+def test_the_number_of_threads_does_not_change_a_run(tmp_path):
+    """LAPACK in several threads rounds otherwise."""
+    case = ROOT / "bench" / "work_precision" / "table1.nml"
+    phi = []
+    for threads in ("1", "2"):
+        result = rodyn("run", case, "--output", f"{threads}.h5", cwd=tmp_path, env=os.environ | {"OPENBLAS_NUM_THREADS": threads})
+        assert result.returncode == 0, result.stderr
+        with h5py.File(tmp_path / f"{threads}.h5") as run:
+            phi.append(run["phi"][:])
+    assert np.array_equal(*phi)

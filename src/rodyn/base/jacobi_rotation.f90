@@ -53,13 +53,14 @@ contains
    !> Rotate columns of x until the parts b_i in its first m rows are (nearly) orthogonal, all other rows along with them.
    !>
    !> Pairs are taken as in a tournament in which each column plays each other: no rotation of a round waits for another one. What
-   !> a sweep leaves is about the square of what it found, so that the last one need not be looked at.
+   !> a sweep leaves is about the square of what it found, so that the last one need not be looked at (where squares are nearly
+   !> equal it may be more: up to the root of `negligible`).
    pure subroutine orthogonalise_columns(x, m, smallest, negligible, squares)
       real(wp), contiguous, intent(inout) :: x(:, :)
       integer, intent(in) :: m
       real(wp), intent(in) :: smallest     !! columns with a smaller square need no precision
       real(wp), intent(in) :: negligible   !! b_i.b_j, of the smaller square
-      real(wp), intent(out) :: squares(:)  !! |b_i|^2 (columns)
+      real(wp), intent(out) :: squares(:)  !! |b_i|^2, followed through the rotations (columns)
       integer, parameter :: most_sweeps = 12
       real(wp) :: product_ij, found, largest, c, s
       integer :: sweep, round, pair, n, others, i, j

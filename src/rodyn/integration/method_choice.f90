@@ -66,17 +66,18 @@ contains
          ! Latching excites all vibrations of the rods, which a trial on the beginning of the run does not see.
          if (scene%dynamic_bending .and. any(scene%hinges%mechanisms%latch < none_given)) return
          ratio = 1.0_wp
-         if (minval(expected_efforts(scene, options, rates, ratio, t_end)) >= short_run) then
-            call fastest_rates(with_rigid_rods(scene), y(:scene%n_base + scene%n + scene%n_q - scene%n_dof), rates%slow)
-            if (rates%slow > 0.0_wp) ratio = max(rates%frequency, rates%decay)/rates%slow
-         end if
          outputs = [(n_outputs*effort_of_output(candidates(i)%method, scene), i=1, size(candidates))]
          expected = expected_efforts(scene, options, rates, ratio, t_end)
-         best = minloc(expected, dim=1)
-         if (expected(best) < short_run .or. &
-             ratio*(1.0_wp + outputs(best)/expected(best)) < stiff_from(options%rtol, rates)) then
+         if (minval(expected + outputs(:n_even)) >= short_run) then
+            call fastest_rates(with_rigid_rods(scene), y(:scene%n_base + scene%n + scene%n_q - scene%n_dof), rates%slow)
+            if (rates%slow > 0.0_wp) ratio = max(rates%frequency, rates%decay)/rates%slow
+            expected = expected_efforts(scene, options, rates, ratio, t_end)
+         end if
+         best = minloc(expected + outputs(:n_even), dim=1)
+         if (expected(best) + outputs(best) < short_run .or. .not. rates%slow > 0.0_wp .or. &
+             ratio*(expected(best) + outputs(best)) < stiff_from(options%rtol, rates)*expected(best)) then
             expected = expected + outputs(:n_even)
-            if (expected(1) <= merge(1.0_wp, even_lead, vibrating(rates, t_end) < 1.0_wp)*expected(2)) return
+            if (expected(1)/merge(1.0_wp, even_lead, vibrating(rates, t_end) < 1.0_wp) <= expected(2)) return ! that may be huge
             choice%method = 'gauss'
             choice%steps = expected_steps('gauss', options, rates, t_end)
             return

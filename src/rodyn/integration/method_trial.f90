@@ -136,7 +136,7 @@ contains
       class(monitor_type), target, intent(inout), optional :: monitor !! may end the trial, which then tells nothing
       type(trial_monitor), target :: listener
       type(runner) :: runners(size(candidates))
-      real(wp) :: first, allowed, budget
+      real(wp) :: first, allowed
       integer :: i, best
       logical :: over
 
@@ -151,7 +151,8 @@ contains
             call continue_runner(runners(i), candidates(i), scene, y, options, t_first, allowed, listener)
             forecast(i) = forecast_of(runners(i), t_end, candidates(i)%order == 2 .and. allowed > 3.0_wp*first)
             if (candidates(i)%order == 2 .and. grows_for_good(runners(i), rates)) &
-               forecast(i) = settled(runners(i), rates) + quiet(runners(i), rates, options%rtol, t_end)
+               forecast(i) = min(forecast_of(runners(i), t_end, .false.), &
+                                 settled(runners(i), rates) + quiet(runners(i), rates, options%rtol, t_end))
          end do
          best = n_even + minloc(forecast(n_even + 1:), dim=1)
          over = any(runners%reached >= t_first) .or. all([(outdone(i), i=n_even + 1, size(candidates))])
@@ -170,9 +171,9 @@ contains
 
    contains
 
-      !> Whether the trial has had its share of the run. One that may
-      !> still become unstable has to show its whole run.
+      !> Whether the trial has had its share of the run. One that may still become unstable has to show its whole run.
       logical function is_spent()
+         real(wp) :: budget
          budget = min(most_effort(scene), even_share*minval(forecast(:n_even)))
          if (forecast(best) < minval(forecast(:n_even)) .and. .not. order_is_risky(best)) &
             budget = min(budget, merge(growing_share, own_share, candidates(best)%order == 2 .and. &
@@ -201,11 +202,13 @@ contains
             call continue_runner(runners(j), candidates(j), scene, y, options, t_first, most, listener)
             forecast(j) = forecast_of(runners(j), t_end, .false.)
             ! Explicit steps bound by dampers cost what is known beforehand, once the first vibrations have died out.
-            if (j == 1 .and. rates%decay > rates%frequency) forecast(j) = min(forecast(j), expected(j))
+            if (j == 1 .and. rates%decay > rates%frequency .and. .not. runners(j)%failed) &
+               forecast(j) = min(forecast(j), expected(j))
          end do
-         if (rates%strongly_damped() .or. minval(runners(:n_even)%reached) >= min(t_quiet, t_end)) return
+         if (rates%strongly_damped() .or. .not. t_quiet < t_end .or. &
+             .not. any(runners(:n_even)%effort > 0.0_wp .and. runners(:n_even)%reached < t_quiet)) return
          do j = 1, n_even ! what was seen of these two are vibrations that dampers will calm: the rest is not dearer than expected
-            forecast(j) = min(forecast(j), expected(j))
+            if (.not. runners(j)%failed) forecast(j) = min(forecast(j), expected(j))
          end do
       end subroutine try_even
 
@@ -305,9 +308,9 @@ contains
    end function grows_for_good
 
    !> Effort until the vibrations are calm that hold back the steps of BDF of order 2, h ~ amplitude^(-1/3). Dampers reduce the
-   !> amplitude exponentially in time, so that 1/h falls to zero linearly with the number of steps; the method itself, by
-   !> (h omega)^4/4 a step, so that 1/h^4 does. Where both act the square is about right. With the growth of the pace from one round
-   !> to the next that gives the end.
+   !> amplitude exponentially in time, so that 1/h falls to zero linearly with the number of steps. The method itself, by
+   !> (h omega)^4/4 a step, would make 1/h^4 do so; where dampers are weak or none the square is about right, since slower
+   !> vibrations of the rods last longer than the fastest. With the growth of the pace from one round to the next that gives the end.
    real(wp) function settled(self, rates)
       type(runner), intent(in) :: self
       type(fast_rates), intent(in) :: rates

@@ -11,6 +11,7 @@ module rodyn_run
    use rodyn_kinematics, only: invariants_type
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, time_text
    use rodyn_integrators, only: new_integrator, sundials_version
+   use rodyn_lapack, only: use_one_thread
    use rodyn_method_choice, only: method_choice, choose_method
    use rodyn_simulation, only: observer_type, even_times, simulate
    use rodyn_ledger, only: fill_row
@@ -73,6 +74,7 @@ contains
       if (present(quiet)) silent = quiet
       if (present(force)) replace = force
       call system_clock(clock_start, clock_rate)
+      call use_one_thread() ! or the number of cores would decide the last digits
 
       call check_output_path(path, replace, error)
       if (.not. allocated(error)) call check_needs(config, path, error)
