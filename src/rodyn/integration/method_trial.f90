@@ -310,7 +310,7 @@ contains
    !> Effort until the vibrations are calm that hold back the steps of BDF of order 2, h ~ amplitude^(-1/3). Dampers reduce the
    !> amplitude exponentially in time, so that 1/h falls to zero linearly with the number of steps. The method itself, by
    !> (h omega)^4/4 a step, would make 1/h^4 do so; where dampers are weak or none the square is about right, since slower
-   !> vibrations of the rods last longer than the fastest. With the growth of the pace from one round to the next that gives the end.
+   !> vibrations of the rods last longer than the fastest. With the growth of the pace from round to round that gives the end.
    real(wp) function settled(self, rates)
       type(runner), intent(in) :: self
       type(fast_rates), intent(in) :: rates
