@@ -7,6 +7,7 @@ module rodyn_gauss_collocation
    use rodyn_kinds, only: wp
    use rodyn_lanes, only: s => lanes
    use rodyn_quadrature, only: gauss_rule, new_gauss_rule
+   use rodyn_lane_algebra, only: expand
    use rodyn_lapack, only: dgeev
    implicit none (type, external)
    private
@@ -97,8 +98,8 @@ contains
       real(wp), intent(in) :: start, length
       integer, intent(in), optional :: degree !! < s; absent: s - 1
       real(wp) :: matrix(s, s)
-      real(wp) :: p(s, 0:s - 1), x(s), column(s)
-      integer :: j, k, l, last
+      real(wp) :: p(s, 0:s - 1), x(s)
+      integer :: k, l, last
 
       last = s - 1
       if (present(degree)) last = degree
@@ -111,16 +112,8 @@ contains
             p(l, k) = ((2*k - 1)*x(l)*p(l, k - 1) - (k - 1)*p(l, k - 2))*(1.0_wp/k)
          end do
       end do
-      do j = 1, s
-         column = self%coefficients(1, j)
-         do k = 1, last
-            !$omp simd
-            do l = 1, s
-               column(l) = column(l) + self%coefficients(k + 1, j)*p(l, k)
-            end do
-         end do
-         matrix(:, j) = column
-      end do
+      matrix = 0.0_wp
+      call expand(s, last + 1, s, self%coefficients, p, matrix)
    end function interpolation
 
    !> The real matrix (1 + x A + y A^2)^-1 - 1, by its values at the eigenvalues of A.
@@ -128,16 +121,17 @@ contains
       class(gauss_collocation), intent(in) :: self
       real(wp), intent(in) :: x, y
       real(wp), intent(out) :: matrix(s, s)
-      real(wp) :: real_part(n_pairs), imaginary_part(n_pairs), weight(2*n_pairs), column(s)
+      real(wp), dimension(n_pairs) :: real_part, imaginary_part, inverse_square
+      real(wp) :: weight(2*n_pairs), column(s)
       integer :: i, j, l
 
       associate (re => real(self%lambda, wp), im => aimag(self%lambda))
          real_part = 1.0_wp + re*x + (re**2 - im**2)*y
          imaginary_part = im*x + 2.0_wp*re*im*y
       end associate
-      column(:n_pairs) = 1.0_wp/(real_part**2 + imaginary_part**2)
-      weight(:n_pairs) = real_part*column(:n_pairs) - 1.0_wp
-      weight(n_pairs + 1:) = -imaginary_part*column(:n_pairs)
+      inverse_square = 1.0_wp/(real_part**2 + imaginary_part**2)
+      weight(:n_pairs) = real_part*inverse_square - 1.0_wp
+      weight(n_pairs + 1:) = -imaginary_part*inverse_square
       do i = 1, s
          column = 0.0_wp
          do j = 1, 2*n_pairs

@@ -173,11 +173,11 @@ contains
 
       !> Whether the trial has had its share of the run. One that may still become unstable has to show its whole run.
       logical function is_spent()
-         real(wp) :: budget
+         real(wp) :: budget, share
          budget = min(most_effort(scene), even_share*minval(forecast(:n_even)))
-         if (forecast(best) < minval(forecast(:n_even)) .and. .not. order_is_risky(best)) &
-            budget = min(budget, merge(growing_share, own_share, candidates(best)%order == 2 .and. &
-                                       runners(best)%growth > 1.4_wp)*forecast(best))
+         share = own_share
+         if (candidates(best)%order == 2 .and. runners(best)%growth > 1.4_wp) share = growing_share
+         if (forecast(best) < minval(forecast(:n_even)) .and. .not. order_is_risky(best)) budget = min(budget, share*forecast(best))
          is_spent = allowed >= budget
       end function is_spent
 
