@@ -5,6 +5,9 @@ module test_gauss
    use rodyn_case_config, only: case_config
    use rodyn_lanes, only: lanes
    use rodyn_gauss_collocation, only: gauss_collocation, new_gauss_collocation
+   use rodyn_stiff_modes, only: stiff_modes
+   use rodyn_modal_reply, only: modal_reply
+   use rodyn_lapack, only: dgesv
    use test_testing, only: unittest, new_test, check, check_close
    use test_random_scenes, only: random_case, seed_random, kind_name, n_kinds
    use rodyn_case_reader, only: read_case
@@ -24,6 +27,9 @@ contains
          new_test('the error follows the tolerance over nine decades', test_tolerance), &
          new_test('large fixed steps keep the energy for thousands of periods', test_energy), &
          new_test('steps far beyond the stiffest vibration keep the slow motion', test_stiff), &
+         new_test('modes that dampers couple answer as the equations of all nodes at once', test_coupled), &
+         new_test('dampers of any strength cost no more than 7 iterations a step', test_dampers), &
+         new_test('dampers alone hold a free hinge', test_free_hinge), &
          new_test('relaxing joints are refused by name', test_refused)]
    end subroutine collect_gauss
 
@@ -180,6 +186,113 @@ contains
       if (allocated(error)) return
       call check_close(error, motion%rows(1)%phi, exact%rows(1)%phi, 1.0e-5_wp, 'phi')
    end subroutine test_stiff
+
+   !> z = (1 + h A D + h^2 A^2 K)^-1 r - r for three modes, by LAPACK from the equations of all nodes and modes at once. Where
+   !> each damper is moved by one mode only, both ways of the program must agree, too.
+   subroutine test_coupled(error)
+      type(error_type), allocatable, intent(out) :: error
+      integer, parameter :: n = 3, m = n*lanes
+      real(wp), parameter :: h = 0.3_wp
+      type(gauss_collocation) :: rule
+      type(stiff_modes) :: modes
+      type(modal_reply) :: modal
+      real(wp) :: matrix(m, m), x(m, 1), residuals(lanes, n), reply(lanes, n), k_ij, d_ij
+      integer :: pivots(m), info, i, j, l
+
+      call new_gauss_collocation(rule)
+      call modes%reserve(n, n, 0, 2)
+      modes%n = n
+      modes%coupled = .true.
+      modes%weight = 0.7_wp
+      modes%square = [900.0_wp, 30.0_wp, 5.0_wp]
+      modes%grip = reshape([0.2_wp, 0.4_wp, -0.3_wp, -0.1_wp, 0.3_wp, 0.8_wp], [n, 2])
+      modes%grip_t = transpose(modes%grip)
+      residuals = reshape([(sin(3.0_wp*i), i=1, m)], [lanes, n])
+      do i = 1, n
+         do j = 1, n
+            d_ij = modes%square(i)*dot_product(modes%grip_t(:, i), modes%grip_t(:, j))
+            k_ij = -modes%weight*d_ij
+            if (i == j) k_ij = k_ij + modes%square(i)
+            matrix((i - 1)*lanes + 1:i*lanes, (j - 1)*lanes + 1:j*lanes) = h*d_ij*rule%a + h**2*k_ij*rule%a2
+         end do
+      end do
+      do l = 1, m
+         matrix(l, l) = matrix(l, l) + 1.0_wp
+      end do
+      x = reshape(residuals, [m, 1])
+      call dgesv(m, 1, matrix, m, pivots, x, m, info)
+      call modal%prepare(rule, modes, h)
+      call modal%answer(rule, modes, residuals, reply)
+      call check(error, info == 0 .and. maxval(abs(reply + residuals - reshape(x, [lanes, n]))) < 1.0e-9_wp, 'coupled')
+      if (allocated(error)) return
+      modes%grip = 0.0_wp
+      modes%grip(1, 1) = 0.3_wp
+      modes%grip(3, 2) = 0.5_wp
+      modes%grip_t = transpose(modes%grip)
+      modes%damping = modes%square*sum(modes%grip**2, dim=2)
+      call modal%prepare(rule, modes, h)
+      call modal%answer(rule, modes, residuals, reply)
+      x = reshape(reply, [m, 1])
+      modes%coupled = .false.
+      call modal%prepare(rule, modes, h)
+      call modal%answer(rule, modes, residuals, reply)
+      call check_close(error, reshape(reply, [m]), x(:, 1), 1.0e-10_wp, 'not coupled')
+   end subroutine test_coupled
+
+   !> Dampers of table 1 times 1 to 1e6, decay rates up to 2000 times the fastest frequency, against explicit steps or BDF.
+   subroutine test_dampers(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+      type(trajectory) :: exact, motion
+      character(len=40) :: text
+      integer :: i
+
+      do i = 0, 6
+         call table1_case(config, error)
+         if (allocated(error)) return
+         config%chain%hinge_damping = 10.0_wp**i*config%chain%hinge_damping
+         config%solver%method = merge('dop853', 'bdf   ', i < 4)
+         config%solver%rtol = 1.0e-11_wp
+         config%solver%atol = 1.0e-13_wp
+         call integrate(config, [0.1_wp], exact, error)
+         if (allocated(error)) return
+         config%solver%method = 'gauss'
+         config%solver%rtol = 1.0e-8_wp
+         config%solver%atol = 1.0e-8_wp
+         call integrate(config, [0.1_wp], motion, error)
+         if (allocated(error)) return
+         write (text, '(a, i0, 2(a, i0))') 'D times 1e', i, ': steps ', motion%counts%n_steps, ', rhs ', motion%counts%n_rhs
+         call check_close(error, motion%rows(1)%phi, exact%rows(1)%phi, 1.0e-8_wp, text)
+         if (allocated(error)) return
+         call check(error, motion%counts%n_steps < 100 .and. motion%counts%n_rhs < 7*lanes*motion%counts%n_steps, text)
+         if (allocated(error)) return
+      end do
+   end subroutine test_dampers
+
+   !> No spring in a hinge, but a strong damper: it is no part of the stiffness.
+   subroutine test_free_hinge(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+      type(trajectory) :: exact, motion
+
+      call table1_case(config, error)
+      if (allocated(error)) return
+      config%chain%hinge_stiffness(2) = 0.0_wp
+      config%chain%hinge_damping = 100.0_wp
+      config%solver%method = 'bdf'
+      config%solver%rtol = 1.0e-11_wp
+      config%solver%atol = 1.0e-13_wp
+      call integrate(config, [0.1_wp], exact, error)
+      if (allocated(error)) return
+      config%solver%method = 'gauss'
+      config%solver%rtol = 1.0e-8_wp
+      config%solver%atol = 1.0e-8_wp
+      call integrate(config, [0.1_wp], motion, error)
+      if (allocated(error)) return
+      call check_close(error, motion%rows(1)%phi, exact%rows(1)%phi, 1.0e-8_wp, 'phi')
+      if (allocated(error)) return
+      call check(error, motion%counts%n_steps < 100 .and. motion%counts%n_rhs < 7*lanes*motion%counts%n_steps, 'effort')
+   end subroutine test_free_hinge
 
    subroutine test_refused(error)
       type(error_type), allocatable, intent(out) :: error

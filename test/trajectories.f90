@@ -10,7 +10,7 @@ module test_trajectories
    use rodyn_user_load, only: user_load
    use rodyn_hinge_events, only: hinge_event
    use rodyn_run_file, only: run_row, new_run_row
-   use rodyn_integrator, only: integrator_type, solver_options
+   use rodyn_integrator, only: integrator_type, solver_options, solver_statistics
    use rodyn_integrators, only: new_integrator
    use rodyn_simulation, only: observer_type, listed_times, simulate
    implicit none (type, external)
@@ -24,6 +24,7 @@ module test_trajectories
       real(wp) :: initial_energy = 0.0_wp
       type(hinge_event), allocatable :: events(:)
       integer :: n_events = 0
+      type(solver_statistics) :: counts !! of the integrator
    contains
       procedure :: observe
    end type trajectory
@@ -67,6 +68,7 @@ contains
       call simulate(motion, integrator, listed_times(times), times(size(times)), result, y, t, error)
       result%n_events = motion%events%n_logged
       result%events = motion%events%log
+      result%counts = integrator%statistics()
       call integrator%finalize()
    end subroutine integrate
 

@@ -2,7 +2,8 @@
 module smooth_problems
    use rodyn_kinds, only: wp
    use rodyn_lanes, only: lanes
-   use rodyn_ode, only: mechanical_system, stiff_modes
+   use rodyn_ode, only: mechanical_system
+   use rodyn_stiff_modes, only: stiff_modes
    implicit none (type, external)
    private
    public :: smooth_problem, kepler, polynomial_chain
@@ -200,15 +201,15 @@ contains
    end subroutine lane_accelerations
 
    !> None: the fixed-point iteration is the method's own.
-   subroutine find_modes(self, q, slowest, modes, ok)
+   subroutine find_modes(self, q, slowest, weight, modes, ok)
       class(smooth_problem), intent(inout) :: self
       real(wp), intent(in) :: q(:)
-      real(wp), intent(in) :: slowest
+      real(wp), intent(in) :: slowest, weight
       type(stiff_modes), intent(inout) :: modes
       logical, intent(out) :: ok
-      associate (unused => q, unused_slowest => slowest); end associate
+      associate (unused => q, unused_slowest => slowest, unused_weight => weight); end associate
       modes%n = 0
-      call modes%reserve(0, self%n_dof, 0)
+      call modes%reserve(0, self%n_dof, 0, 0)
       ok = .true.
    end subroutine find_modes
 

@@ -7,7 +7,7 @@ module rodyn_lapack
    implicit none (type, external)
    private
    public :: use_one_thread, symmetric_eigenvalues
-   public :: dpotrf, dpotrs, dgesv, dgetrf, dgetrs, dsyev, dgeev, dgemv, dtrsm
+   public :: dpotrf, dpotrs, dpstrf, dgesv, dgetrf, dgetrs, dsyev, dgeev, dgemv, dtrsm
 
    interface
       !> Cholesky factors of a symmetric positive definite matrix.
@@ -19,6 +19,18 @@ module rodyn_lapack
          real(wp), intent(inout) :: a(lda, *)
          integer, intent(out) :: info
       end subroutine dpotrf
+
+      !> Cholesky factorisation of a semidefinite matrix, rows and columns interchanged.
+      pure subroutine dpstrf(uplo, n, a, lda, piv, rank, tol, work, info)
+         import :: wp
+         implicit none (type, external)
+         character(len=1), intent(in) :: uplo
+         integer, intent(in) :: n, lda
+         real(wp), intent(inout) :: a(lda, *)
+         integer, intent(out) :: piv(*), rank, info
+         real(wp), intent(in) :: tol
+         real(wp), intent(out) :: work(*)
+      end subroutine dpstrf
 
       !> Solve with the factors of dpotrf.
       pure subroutine dpotrs(uplo, n, nrhs, a, lda, b, ldb, info)

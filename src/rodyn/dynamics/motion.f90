@@ -7,7 +7,8 @@ module rodyn_motion
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
    use rodyn_lanes, only: lanes
-   use rodyn_ode, only: mechanical_system, stiff_modes, factorise_dense, solve_dense
+   use rodyn_ode, only: mechanical_system, factorise_dense, solve_dense
+   use rodyn_stiff_modes, only: stiff_modes
    use rodyn_scene_modes, only: modes_finder, new_modes_finder
    use rodyn_trigonometry, only: sine_cosine
    use rodyn_case_config, only: initial_config
@@ -184,10 +185,11 @@ contains
    end subroutine lane_accelerations
 
    !> Stiff modes at q; none if there are too many unknowns.
-   subroutine find_modes(self, q, slowest, modes, ok)
+   subroutine find_modes(self, q, slowest, weight, modes, ok)
       class(motion_type), intent(inout) :: self
       real(wp), intent(in) :: q(:)
       real(wp), intent(in) :: slowest !! [rad/s]
+      real(wp), intent(in) :: weight  !! [1/s]
       type(stiff_modes), intent(inout) :: modes
       logical, intent(out) :: ok
 
@@ -200,12 +202,12 @@ contains
       ok = .true.
       modes%n = 0
       if (.not. self%modes%available) then
-         call modes%reserve(0, self%n_dof, self%n_ignorable)
+         call modes%reserve(0, self%n_dof, self%n_ignorable, 0)
          return
       end if
       associate (scene => self%dynamics%scene, work => self%dynamics%work)
          call sine_cosine(scene%n, q(scene%n_base + 1:scene%n_base + scene%n), work%sine(1:), work%cosine(1:))
-         call self%modes%find(scene, work%sine, work%cosine, q, slowest, modes, ok)
+         call self%modes%find(scene, work%sine, work%cosine, q, slowest, weight, modes, ok)
       end associate
    end subroutine find_modes
 

@@ -1,73 +1,133 @@
 !> Stiff modes of a scene near a configuration, for integrators that solve them implicitly (`rodyn_gauss_integrator`).
 !>
-!> With the constant stiffness K = L L^T of springs and rods and M(q) = R R^T, the modes follow from the rotation Q that
+!> With the constant K + w D = L L^T of springs, rods and dampers and M(q) = R R^T, the modes follow from the rotation Q that
 !> makes the columns of B = R^-1 L Q orthogonal:
-!>     |b_i|^2 = omega_i^2,   u = R^-T B / omega^2,   v = L Q.
+!>     square_i = |b_i|^2,   u = R^-T B/square,   v = L Q.
 !> Loads, centrifugal and gyroscopic terms are left out: they are not stiff. With locked hinges T (T^T M T)^-1 T^T stands for
 !> M^-1 (`rodyn_locks`).
 module rodyn_scene_modes
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
-   use rodyn_ode, only: stiff_modes
+   use rodyn_stiff_modes, only: stiff_modes
    use rodyn_scene, only: scene_type
    use rodyn_assembled, only: assembled_system, new_assembled_system, mass_matrix
    use rodyn_locks, only: has_slaves, reduce, expand, reduce_matrix
    use rodyn_jacobi_rotation, only: orthogonalise_columns
-   use rodyn_lapack, only: dpotrf, dtrsm, dsyev, dgemv
+   use rodyn_lapack, only: dpotrf, dpstrf, dtrsm, dsyev, dgemv
    implicit none (type, external)
    private
    public :: modes_finder, new_modes_finder, most_dof
 
    integer, parameter :: most_dof = 200 !! beyond, eigenvectors cost more than they bring
-   real(wp), parameter :: negligible = 1.0e-5_wp !! b_i.b_j, of the smaller omega^2
+   real(wp), parameter :: negligible = 1.0e-5_wp !! b_i.b_j, of the smaller square; likewise if dampers matter, whose squares
+   real(wp), parameter :: damped_negligible = 1.0e-9_wp !! may be large
+   real(wp), parameter :: little = 0.2_wp      !! of dampers beside springs: their weight is of no importance
+   real(wp), parameter :: much = 0.03_wp         !! coupling of modes by dampers that matters
 
    !> What stays constant of a scene, and memory.
    type :: modes_finder
       logical :: available = .false.
       type(assembled_system) :: system
+      real(wp) :: weight = 0.0_wp            !! w in what was factored [1/s]
+      real(wp) :: relaxation = 0.0_wp        !! largest ratio of a damper to its spring; 0: no dampers [s]
       real(wp), allocatable :: columns(:, :) !! B, and below it L Q with Q of the last modes (2 n_dof, rank)
-      real(wp), allocatable :: omega_2(:), work(:)
+      real(wp), allocatable :: dampers(:, :) !! G, D = G G^T (n_dof, rank of D)
+      real(wp), allocatable :: squares(:), work(:)
    contains
       procedure :: find
    end type modes_finder
 
 contains
 
-   !> Factor the stiffness.
+   !> Gather what stays constant.
    subroutine new_modes_finder(finder, scene)
       type(modes_finder), intent(out) :: finder
       type(scene_type), intent(in) :: scene
       type(error_type), allocatable :: error
+
+      if (scene%n_dof > most_dof) return
+      call new_assembled_system(finder%system, scene, error)
+      if (allocated(error)) return
+      allocate (finder%work(scene%n_dof))
+      call first_weight(finder, scene)
+      call factor_dampers(finder)
+      call factor(finder, finder%weight)
+      finder%available = size(finder%squares) > 0
+   end subroutine new_modes_finder
+
+   !> Relaxation times of the dampers, and a weight so small that it only makes room for what nothing but dampers hold.
+   subroutine first_weight(self, scene)
+      type(modes_finder), intent(inout) :: self
+      type(scene_type), intent(in) :: scene
+      real(wp), parameter :: small = 1.0e-3_wp
+      logical :: damped(scene%n)
+
+      associate (stiffness => scene%hinges%stiffness, damping => scene%hinges%damping)
+         damped = damping > 0.0_wp .and. .not. scene%hinges%locked
+         if (.not. any(damped)) return
+         self%relaxation = maxval(damping/max(stiffness, tiny(1.0_wp)/epsilon(1.0_wp), epsilon(1.0_wp)*damping), mask=damped)
+         self%weight = 1.0_wp
+         if (any(damped .and. stiffness > 0.0_wp)) &
+            self%weight = small*minval(stiffness/damping, mask=damped .and. stiffness > 0.0_wp)
+      end associate
+   end subroutine first_weight
+
+   !> G of D = G G^T.
+   subroutine factor_dampers(self)
+      type(modes_finder), intent(inout) :: self
+      real(wp), allocatable :: matrix(:, :), work(:)
+      integer, allocatable :: pivots(:)
+      integer :: info, m, rank, i, j
+
+      m = size(self%system%d, 1)
+      rank = 0
+      if (self%relaxation > 0.0_wp) then
+         matrix = self%system%d
+         allocate (pivots(m), work(2*m))
+         call dpstrf('L', m, matrix, m, pivots, rank, -1.0_wp, work, info)
+      end if
+      allocate (self%dampers(m, rank), source=0.0_wp)
+      do i = 1, rank
+         do j = i, m
+            self%dampers(pivots(j), i) = matrix(j, i)
+         end do
+      end do
+   end subroutine factor_dampers
+
+   !> L of K + weight D = L L^T, without columns of zeros.
+   subroutine factor(self, weight)
+      type(modes_finder), intent(inout) :: self
+      real(wp), intent(in) :: weight
       real(wp), allocatable :: vectors(:, :), values(:), work(:)
       integer :: info, m, i, rank
 
-      m = scene%n_dof
-      if (m > most_dof) return
-      call new_assembled_system(finder%system, scene, error)
-      if (allocated(error)) return
-      vectors = finder%system%k
+      self%weight = weight
+      vectors = self%system%k + weight*self%system%d
+      m = size(vectors, 1)
       allocate (values(m), work(40*m))
       call dsyev('V', 'L', m, vectors, m, values, work, size(work), info)
-      if (info /= 0) return
       rank = count(values > 1.0e-14_wp*maxval(values))
-      allocate (finder%columns(2*m, rank), finder%omega_2(rank), finder%work(m))
+      if (info /= 0) rank = 0
+      if (allocated(self%columns)) deallocate (self%columns, self%squares)
+      allocate (self%columns(2*m, rank), self%squares(rank))
       do i = 1, rank
-         finder%columns(m + 1:, i) = vectors(:, m - rank + i)*sqrt(values(m - rank + i))
+         self%columns(m + 1:, i) = vectors(:, m - rank + i)*sqrt(values(m - rank + i))
       end do
-      finder%available = rank > 0
-   end subroutine new_modes_finder
+   end subroutine factor
 
-   !> Modes at q that are faster than `slowest`. Not `ok`: M is not positive definite.
-   subroutine find(self, scene, sine, cosine, q, slowest, modes, ok)
+   !> Modes at q that are faster than `slowest`, for a weight of dampers. Not `ok`: M is not positive definite.
+   subroutine find(self, scene, sine, cosine, q, slowest, weight, modes, ok)
       class(modes_finder), intent(inout) :: self
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: sine(0:), cosine(0:) !! of phi (0:n)
       real(wp), intent(in) :: q(:)                 !! (n_dof)
       real(wp), intent(in) :: slowest              !! [rad/s]
+      real(wp), intent(in) :: weight               !! 0: unknown [1/s]
       type(stiff_modes), intent(inout) :: modes
       logical, intent(out) :: ok
-      integer :: info, i, j, m, rank
+      integer :: info, i, m, rank
 
+      if (weight_matters(self, weight)) call factor(self, weight)
       m = scene%n_dof
       rank = size(self%columns, 2)
       call mass_matrix(self%system, scene, sine, cosine, q)
@@ -82,7 +142,8 @@ contains
       call dtrsm('L', 'L', 'N', 'N', m, rank, 1.0_wp, self%system%m, m, self%columns, 2*m)
       ! It starts from what was orthogonal for an earlier configuration, so that few sweeps are enough; what little is left
       ! costs the integrator less than another sweep.
-      call orthogonalise_columns(self%columns, m, slowest**2, negligible, self%omega_2)
+      call orthogonalise_columns(self%columns, m, slowest**2, merge(damped_negligible, negligible, &
+                                 self%weight*self%relaxation > little), self%squares)
       call dtrsm('L', 'L', 'T', 'N', m, rank, 1.0_wp, self%system%m, m, self%columns, 2*m)
       if (has_slaves(scene)) then
          self%work(:) = 0.0_wp
@@ -90,21 +151,79 @@ contains
             call expand(scene, scene%hinges%locked, self%work(:scene%n), self%columns(:m, i))
          end do
       end if
-      modes%n = count(self%omega_2 > max(slowest**2, 1.0e-12_wp*maxval(self%omega_2)))
-      call modes%reserve(rank, m, scene%n_base)
-      j = 0
-      do i = 1, rank
-         if (.not. self%omega_2(i) > max(slowest**2, 1.0e-12_wp*maxval(self%omega_2))) cycle
-         j = j + 1
-         modes%omega_2(j) = self%omega_2(i)
-         modes%v(:, j) = self%columns(m + scene%n_base + 1:, i)
-         self%columns(:m, i) = self%columns(:m, i)/self%omega_2(i)
-         modes%u(j, :) = self%columns(:m, i)
-         modes%damping(j) = 0.0_wp
-         if (.not. self%system%damped) cycle ! v^T M^-1 D u with v = omega^2 M u
-         call dgemv('N', m, m, modes%omega_2(j), self%system%d, m, self%columns(:m, i), 1, 0.0_wp, self%work, 1)
-         modes%damping(j) = dot_product(self%columns(:m, i), self%work)
-      end do
+      call keep_fast_modes(self, scene%n_base, slowest, modes)
+      modes%weight = self%weight
+      modes%coupled = .false.
+      modes%damping = 0.0_wp
+      if (.not. self%relaxation > 0.0_wp) return
+      call add_dampers(self, modes)
+      modes%coupled = weight > 0.0_wp .and. coupling(modes, weight) > much
    end subroutine find
+
+   !> Whether modes for this weight of dampers are others than those of the weight that was factored.
+   pure logical function weight_matters(self, weight)
+      type(modes_finder), intent(in) :: self
+      real(wp), intent(in) :: weight !! 0: unknown [1/s]
+      weight_matters = weight > 0.0_wp .and. max(weight, self%weight)*self%relaxation > little .and. &
+                       (weight > 4.0_wp*self%weight .or. weight < 0.25_wp*self%weight)
+   end function weight_matters
+
+   subroutine keep_fast_modes(self, n_base, slowest, modes)
+      type(modes_finder), intent(inout) :: self
+      integer, intent(in) :: n_base
+      real(wp), intent(in) :: slowest !! [rad/s]
+      type(stiff_modes), intent(inout) :: modes
+      real(wp) :: least
+      integer :: i, j, m
+
+      m = size(self%work)
+      call modes%reserve(size(self%squares), m, n_base, size(self%dampers, 2))
+      least = max(slowest**2, 1.0e-12_wp*maxval(self%squares))
+      j = 0
+      do i = 1, size(self%squares)
+         if (.not. self%squares(i) > least) cycle
+         j = j + 1
+         modes%square(j) = self%squares(i)
+         modes%v(:, j) = self%columns(m + n_base + 1:, i)
+         modes%u(j, :) = self%columns(:m, i)/self%squares(i)
+      end do
+      modes%n = j
+   end subroutine keep_fast_modes
+
+   !> How each mode moves the dampers.
+   subroutine add_dampers(self, modes)
+      type(modes_finder), intent(in) :: self
+      type(stiff_modes), intent(inout) :: modes
+      integer :: i, k, m, most
+
+      m = size(self%dampers, 1)
+      most = size(modes%square)
+      do k = 1, modes%n_dampers
+         call dgemv('N', modes%n, m, 1.0_wp, modes%u, most, self%dampers(:, k), 1, 0.0_wp, modes%grip(:, k), 1)
+      end do
+      do i = 1, modes%n
+         modes%grip_t(:, i) = modes%grip(i, :)
+         modes%damping(i) = modes%square(i)*dot_product(modes%grip_t(:, i), modes%grip_t(:, i))
+      end do
+   end subroutine add_dampers
+
+   !> How much dampers couple modes in a step whose h lambda is 1/weight: the largest norm of a row, its diagonal left out, of
+   !> (1 + h lambda D + h^2 lambda^2 K), made symmetric and with ones on its diagonal.
+   pure real(wp) function coupling(modes, weight)
+      type(stiff_modes), intent(in) :: modes
+      real(wp), intent(in) :: weight !! [1/s]
+      real(wp) :: row
+      integer :: i, j
+      coupling = 0.0_wp
+      do i = 1, modes%n
+         row = 0.0_wp
+         do j = 1, modes%n
+            if (j /= i) row = row + modes%square(j)/(weight**2 + modes%square(j)) &
+                              *dot_product(modes%grip_t(:, i), modes%grip_t(:, j))**2
+         end do
+         coupling = max(coupling, row*modes%square(i)/(weight**2 + modes%square(i)))
+      end do
+      coupling = weight*sqrt(coupling)
+   end function coupling
 
 end module rodyn_scene_modes

@@ -11,7 +11,7 @@ module rodyn_gauss_collocation
    use rodyn_lapack, only: dgeev
    implicit none (type, external)
    private
-   public :: gauss_collocation, new_gauss_collocation
+   public :: gauss_collocation, new_gauss_collocation, n_pairs
 
    integer, parameter :: n_pairs = s/2 !! eigenvalues of A are complex: pairs
 
@@ -22,6 +22,8 @@ module rodyn_gauss_collocation
       real(wp) :: a2(s, s) = 0.0_wp         !! A^2: twice integrated
       real(wp) :: coefficients(s, s) = 0.0_wp !! (k+1, j): node values to coefficients of P_k
       complex(wp) :: lambda(n_pairs) = 0.0_wp !! eigenvalues of A in the upper half plane
+      real(wp) :: to_pairs(s, s) = 0.0_wp   !! node values to their parts along the eigenvectors of those: real, then imaginary
+      real(wp) :: from_pairs(s, s) = 0.0_wp !! and back
       real(wp) :: projectors(s, s, 2*n_pairs) = 0.0_wp !! twice the real parts of the spectral projectors W_j of A, then
                                                     !! minus twice the imaginary parts: f(A) = sum 2 Re(f(lambda_j) W_j)
    contains
@@ -84,6 +86,10 @@ contains
          right = cmplx(vr(:, j), vr(:, j + 1), wp)
          left = conjg(cmplx(vl(:, j), vl(:, j + 1), wp))
          left = left/sum(left*right)
+         rule%to_pairs(pair, :) = real(left, wp)
+         rule%to_pairs(n_pairs + pair, :) = aimag(left)
+         rule%from_pairs(:, pair) = 2.0_wp*real(right, wp)
+         rule%from_pairs(:, n_pairs + pair) = -2.0_wp*aimag(right)
          do i = 1, s
             rule%projectors(:, i, pair) = 2.0_wp*real(right*left(i), wp)
             rule%projectors(:, i, n_pairs + pair) = -2.0_wp*aimag(right*left(i))

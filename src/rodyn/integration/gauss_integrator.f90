@@ -17,12 +17,14 @@ module rodyn_gauss_integrator
    use rodyn_kinds, only: wp, i8
    use rodyn_lanes, only: s => lanes
    use rodyn_errors, only: error_type, raise
-   use rodyn_ode, only: ode_system, mechanical_system, stiff_modes
+   use rodyn_ode, only: ode_system, mechanical_system
+   use rodyn_stiff_modes, only: stiff_modes
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, time_text
    use rodyn_trigonometry, only: sine_cosine
-   use rodyn_lane_algebra, only: apply, apply_one, multiply, project, project_pair, expand, combine, square_sums, &
-      straight_lines, residual, add, accumulate, copy
+   use rodyn_lane_algebra, only: apply, apply_one, multiply, project, expand, square_sums, straight_lines, &
+      residual, add, accumulate, copy
    use rodyn_gauss_collocation, only: gauss_collocation, new_gauss_collocation
+   use rodyn_modal_reply, only: modal_reply
    implicit none (type, external)
    private
    public :: gauss_integrator, new_gauss_integrator
@@ -32,6 +34,7 @@ module rodyn_gauss_integrator
    real(wp), parameter :: error_constant = 0.5_wp   !! of the error estimate, see `error_estimate`
    real(wp), parameter :: wanted_estimate = 0.05_wp, largest_estimate = 0.7_wp !! of the error, in tolerances
    real(wp), parameter :: first_phase = 2.0_wp      !! fastest frequency times the first step
+   real(wp), parameter :: typical_lambda = 0.14_wp  !! size of an eigenvalue of A
    real(wp), parameter :: smallest_phase = 0.4_wp  !! slower vibrations need no implicit treatment
    integer, parameter :: degrees(*) = [2, s - 1]   !! of the first guess
    integer, parameter :: degree_interval = 16      !! steps after which the degree is judged again
@@ -46,7 +49,7 @@ module rodyn_gauss_integrator
       real(wp) :: h = 0.0_wp                 !! step [s]
       real(wp) :: h_a(s, s) = 0.0_wp         !! h A
       real(wp) :: h2_a2(s, s) = 0.0_wp       !! h^2 A^2
-      real(wp), allocatable :: g(:, :, :)    !! -G of each mode (s, s, n)
+      type(modal_reply) :: modal             !! (1 + h A D + h^2 A^2 K)^-1 - 1 in modes
       real(wp) :: h_last = 0.0_wp            !! step that `ahead` extrapolates from [s]
       real(wp) :: ahead(s, s) = 0.0_wp       !! node values of that step to those of this one
    end type step_matrices
@@ -170,8 +173,7 @@ contains
             self%n_grid = max(1_i8, ceiling(span/self%options%fixed_step*(1.0_wp - 4.0_wp*epsilon(1.0_wp)), i8))
             return
          end if
-         fastest = 0.0_wp
-         if (self%modes%n > 0) fastest = sqrt(maxval(self%modes%omega_2(:self%modes%n)))
+         fastest = self%modes%fastest()
          self%h = span
          if (fastest*span > first_phase) self%h = first_phase/fastest
          if (self%modes%n == 0) self%h = 1.0e-3_wp*span
@@ -333,12 +335,14 @@ contains
       class(gauss_integrator), intent(inout) :: self
       real(wp), intent(in) :: h !! expected step, 0: unknown [s]
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: slowest
+      real(wp) :: slowest, weight
       logical :: ok
 
       slowest = 0.0_wp
+      weight = 0.0_wp
       if (h > 0.0_wp) slowest = smallest_phase/h
-      call self%mechanics%find_modes(self%y(:self%mechanics%n_dof), slowest, self%modes, ok)
+      if (h > 0.0_wp) weight = 1.0_wp/(typical_lambda*h)
+      call self%mechanics%find_modes(self%y(:self%mechanics%n_dof), slowest, weight, self%modes, ok)
       self%counts%n_jac = self%counts%n_jac + 1
       if (.not. ok) then
          call raise(error, 'gauss at t = '//time_text(self%t)//' s: mass matrix not positive definite')
@@ -348,7 +352,7 @@ contains
       self%fewest = most_iterations
       self%now%h = 0.0_wp
       self%spare%h = 0.0_wp
-      associate (most => size(self%modes%omega_2))
+      associate (most => size(self%modes%square))
          if (allocated(self%modal)) then
             if (size(self%modal, 2) /= most) deallocate (self%modal, self%reply, self%stiff, self%rest, self%motion)
          end if
@@ -365,22 +369,13 @@ contains
    subroutine set_step(self, h)
       class(gauss_integrator), intent(inout) :: self
       real(wp), intent(in) :: h
-      integer :: i
 
       if (h == self%now%h) return
       self%now%h = h
       self%now%h_last = 0.0_wp
       self%now%h_a = h*self%rule%a
       self%now%h2_a2 = h**2*self%rule%a2
-      associate (most => size(self%modes%omega_2))
-         if (allocated(self%now%g)) then
-            if (size(self%now%g, 3) /= most) deallocate (self%now%g)
-         end if
-         if (.not. allocated(self%now%g)) allocate (self%now%g(s, s, most))
-      end associate
-      do i = 1, self%modes%n
-         call self%rule%mode_reply(h*self%modes%damping(i), h**2*self%modes%omega_2(i), self%now%g(:, :, i))
-      end do
+      call self%now%modal%prepare(self%rule, self%modes, h)
    end subroutine set_step
 
    subroutine set_weights(self, y)
@@ -396,7 +391,7 @@ contains
    subroutine predict(self, ok)
       class(gauss_integrator), intent(inout) :: self
       logical, intent(out) :: ok
-      integer :: i, m, base
+      integer :: m, base
 
       m = self%mechanics%n_dof
       base = self%mechanics%n_ignorable
@@ -412,14 +407,11 @@ contains
       call multiply(m, self%now%ahead, self%last%smooth, self%trial%smooth)
       associate (modes => self%modes)
          call project(m - base, modes%n, modes%v, self%trial%smooth(:, base + 1:), self%modal)
-         call project_pair(m - base, modes%n, modes%v, self%y(base + 1:), self%y(m + base + 1:), self%rest, self%motion)
-         do i = 1, modes%n
-            self%rest(i) = -modes%omega_2(i)*self%rest(i) - modes%damping(i)*self%motion(i)
-            self%motion(i) = -modes%omega_2(i)*self%motion(i)
-         end do
-         call straight_lines(modes%n, self%rest, self%motion, self%now%h, self%rule%c, self%stiff)
+         call modes%stiff_line(self%y(base + 1:m), self%y(m + base + 1:2*m), self%rest, self%motion)
+         self%rest(:modes%n) = -self%rest(:modes%n)
+         call straight_lines(modes%n, self%rest, self%motion, -self%now%h, self%rule%c, self%stiff)
          call accumulate(modes%n, self%stiff, self%modal)
-         call combine(modes%n, self%now%g, self%modal, self%reply)
+         call self%now%modal%answer(self%rule, self%modes, self%modal, self%reply)
          call accumulate(modes%n, self%stiff, self%reply)
          call copy(m, self%trial%smooth, self%trial%f)
          call expand(m, modes%n, size(modes%u, 1), modes%u, self%reply, self%trial%f)
@@ -472,7 +464,9 @@ contains
    subroutine remove_stiff_part(self, record)
       class(gauss_integrator), intent(inout) :: self
       type(step_record), intent(inout) :: record
-      call stiff_rates(self, record%q, record%p)
+      associate (base => self%mechanics%n_ignorable)
+         call self%modes%stiff_rates(record%q(:, base + 1:), record%p(:, base + 1:), self%modal, self%reply)
+      end associate
       record%smooth(:, :) = record%f
       call expand(self%mechanics%n_dof, self%modes%n, size(self%modes%u, 1), self%modes%u, self%modal, record%smooth)
    end subroutine remove_stiff_part
@@ -489,21 +483,6 @@ contains
          call apply(m - base, h**2*self%rule%a2, record%f(:, base + 1:), record%q(:, base + 1:))
       end associate
    end subroutine restore_nodes
-
-   !> modal = omega^2 v.Q + damping v.P.
-   subroutine stiff_rates(self, q, p)
-      class(gauss_integrator), intent(inout) :: self
-      real(wp), contiguous, intent(in) :: q(:, :), p(:, :)
-      integer :: i
-
-      associate (n => self%modes%n, m => size(q, 2), base => self%mechanics%n_ignorable)
-         call project(m - base, n, self%modes%v, q(:, base + 1:), self%modal)
-         call project(m - base, n, self%modes%v, p(:, base + 1:), self%reply)
-         do i = 1, n
-            self%modal(:, i) = self%modes%omega_2(i)*self%modal(:, i) + self%modes%damping(i)*self%reply(:, i)
-         end do
-      end associate
-   end subroutine stiff_rates
 
    !> Solve for F of `trial` from its first guess. Q and P follow, but for the last correction where nobody asks for it.
    !>
@@ -527,11 +506,12 @@ contains
          self%iterations = j
          call self%mechanics%lane_accelerations(times, self%trial%q, self%trial%p, self%trial%a, ok)
          self%counts%n_rhs = self%counts%n_rhs + s
+         if (self%modes%coupled) self%counts%n_coupled = self%counts%n_coupled + s
          self%refused = .not. ok
          if (.not. ok) return
          call residual(m, self%trial%a, self%trial%f, self%guess, self%trial%smooth)
          call project(m - base, self%modes%n, self%modes%v, self%guess(:, base + 1:), self%modal)
-         call combine(self%modes%n, self%now%g, self%modal, self%reply)
+         call self%now%modal%answer(self%rule, self%modes, self%modal, self%reply)
          call expand(m, self%modes%n, size(self%modes%u, 1), self%modes%u, self%reply, self%guess)
          call add(m, self%guess, self%weight, self%trial%f, sums)
          change = self%now%h*sqrt(sum(sums)/real(s*m, wp))

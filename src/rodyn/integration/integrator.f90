@@ -36,6 +36,7 @@ module rodyn_integrator
    type :: solver_statistics
       integer(i8) :: n_steps = 0               !! internal steps
       integer(i8) :: n_rhs = 0                 !! right-hand sides
+      integer(i8) :: n_coupled = 0             !! of them, those of collocation while dampers couple its modes
       integer(i8) :: n_jac = 0                 !! Jacobians
       integer(i8) :: n_error_test_failures = 0 !! steps repeated because the error was too large
       integer(i8) :: n_nonlinear_failures = 0  !! failures of the nonlinear iteration

@@ -14,8 +14,8 @@ module rodyn_method_choice
    use rodyn_scene_modes, only: most_dof
    use rodyn_fastest_rates, only: fastest_rates, with_rigid_rods
    use rodyn_integrator, only: monitor_type, solver_options, time_text
-   use rodyn_method_trial, only: fast_rates, candidates, n_even, effort_of_nodes, effort_of_modes, effort_of_output, &
-      collocation_step, explicit_step, try_methods
+   use rodyn_method_trial, only: fast_rates, candidates, n_even, effort_of_nodes, effort_of_modes, effort_of_coupling, &
+      effort_of_output, collocation_step, explicit_step, try_methods
    implicit none (type, external)
    private
    public :: method_choice, choose_method
@@ -34,6 +34,7 @@ module rodyn_method_choice
    end type method_choice
 
    real(wp), parameter :: stability_limit = 6.4_wp !! step times decay rate that it bears
+   real(wp), parameter :: coupling_decay = 0.3_wp !! over the frequency, from where dampers couple modes of collocation
    real(wp), parameter :: lasting = 150.0_wp       !! times the fastest decay that vibrations with dampers last
    real(wp), parameter :: short_run = 1500.0_wp    !! right-hand sides that are not worth a trial
    real(wp), parameter :: lead = 1.1_wp            !! by which an implicit method must be faster: it is less accurate
@@ -127,8 +128,7 @@ contains
 
    !> Efforts of explicit steps of order 8 and of collocation, by their steps (docs/performance.md). What the fast vibrations add
    !> to the motion of the chain is nearly linear, so the faster they are, the fewer iterations a step of collocation needs.
-   !> It is out of the question (huge) where it has no lanes or modes or hinges have events, or where dampers are much faster
-   !> than vibrations.
+   !> It is out of the question (huge) where it has no lanes or modes or hinges have events.
    function expected_efforts(scene, options, rates, ratio, t_end) result(effort)
       type(scene_type), intent(in) :: scene
       type(solver_options), intent(in) :: options
@@ -141,22 +141,23 @@ contains
       effort(1) = explicit_step*expected_steps('dop853', options, rates, t_end)
       effort(2) = huge(1.0_wp)
       if (scene%assembled .or. scene%n_q > scene%n_dof .or. scene%n_dof > most_dof .or. size(scene%hinges%mechanisms) > 0) return
-      if (rates%decay > 3.0_wp*rates%frequency) return
       iterations = 4.5_wp
       if (ratio > 1.0_wp) iterations = max(1.2_wp, 8.0_wp*ratio**(-0.2_wp))
-      if (vibrating(rates, t_end) < 1.0_wp) iterations = damped_iterations(ratio, options%rtol, rates%decay/rates%frequency)
-      if (rates%strongly_damped()) iterations = 9.0_wp
-      effort(2) = effort_of_modes(scene, 2) + &
+      if (vibrating(rates, t_end) < 1.0_wp) iterations = damped_iterations(rates, options%rtol)
+      effort(2) = effort_of_modes(scene, merge(4, 2, vibrating(rates, t_end) < 1.0_wp)) + &
                   (collocation_step + iterations*effort_of_nodes(scene))*expected_steps('gauss', options, rates, t_end)
+      if (rates%decay > coupling_decay*rates%frequency) effort(2) = effort(2)*(1.0_wp + effort_of_coupling(scene))
    end function expected_efforts
 
-   !> Iterations of a collocation step where dampers calm the vibrations, which allows longer steps: a fit to 90 measured scenes,
-   !> mostly right to a third.
-   pure real(wp) function damped_iterations(ratio, rtol, damping)
-      real(wp), intent(in) :: ratio   !! fastest rate over the frequencies of the chain
+   !> Iterations of a collocation step where dampers calm the vibrations, which allows longer steps: a fit to 190 measured scenes,
+   !> mostly right to a quarter.
+   pure real(wp) function damped_iterations(rates, rtol)
+      type(fast_rates), intent(in) :: rates
       real(wp), intent(in) :: rtol
-      real(wp), intent(in) :: damping !! fastest decay over the fastest frequency
-      damped_iterations = max(1.0_wp, 5.5_wp*ratio**(-0.053_wp)*(1.0e6_wp*rtol)**(-0.072_wp)*(10.0_wp*damping)**0.21_wp)
+      real(wp) :: ratio !! fastest frequency over those of the chain
+      ratio = 1.0_wp
+      if (rates%slow > 0.0_wp) ratio = rates%frequency/rates%slow
+      damped_iterations = min(9.0_wp, max(1.0_wp, 11.0_wp*ratio**(-0.21_wp)*(1.0e6_wp*rtol)**(-0.05_wp)))
    end function damped_iterations
 
    !> Steps of a run by a method that follows vibrations: of so many radians of the fastest, while it lasts; later as many as
@@ -171,7 +172,7 @@ contains
       share = vibrating(rates, t_end)
       if (method == 'gauss') then
          phase = 8.0_wp*min(1.0_wp, (1.0e4_wp*options%rtol)**0.0625_wp)
-         later = merge(13.0_wp, 20.0_wp, rates%strongly_damped())
+         later = merge(12.0_wp, 18.0_wp, rates%decay > 10.0_wp*rates%frequency)
       else
          phase = 3.0_wp*min(1.0_wp, (1.0e4_wp*options%rtol)**0.125_wp)
          later = 5.5_wp

@@ -3,9 +3,10 @@ module rodyn_ode
    use rodyn_kinds, only: wp
    use rodyn_lanes, only: lanes
    use rodyn_dense_newton, only: dense_newton
+   use rodyn_stiff_modes, only: stiff_modes
    implicit none (type, external)
    private
-   public :: ode_system, mechanical_system, stiff_modes
+   public :: ode_system, mechanical_system
    public :: factorise_dense, solve_dense
 
    !> A system of `n_states` equations, of which the first `n_controlled` take part in step-size control.
@@ -26,18 +27,6 @@ module rodyn_ode
       procedure :: factorise_newton => factorise_dense
       procedure :: solve_newton => solve_dense
    end type ode_system
-
-   !> The stiff part of M(q) p' = ... - K q - D p near a configuration, as modes: S = M^-1 K ~ sum omega^2 u v^T and
-   !> M^-1 D ~ sum damping u v^T, with v_i^T u_j = delta_ij.
-   type :: stiff_modes
-      integer :: n = 0                       !! modes; their number changes, so the arrays have room for `most`
-      real(wp), allocatable :: omega_2(:)    !! square of the natural frequency (most) [rad^2/s^2]
-      real(wp), allocatable :: damping(:)    !! (most) [1/s]
-      real(wp), allocatable :: u(:, :)       !! shapes, transposed (most, n_dof)
-      real(wp), allocatable :: v(:, :)       !! their duals, without ignorable coordinates (n_dof - n_ignorable, most)
-   contains
-      procedure :: reserve
-   end type stiff_modes
 
    !> A mechanical system: y = (q, p [, quadratures]) with p' from q, p and t, and q' = p. If there are ignorable
    !> coordinates, the first two are a displacement along axes that turn:  q(1)' = p(1) + p(3) q(2),  q(2)' = p(2) - p(3) q(1).
@@ -70,13 +59,14 @@ module rodyn_ode
          logical, intent(out) :: ok                              !! false: not in all lanes
       end subroutine lanes_interface
 
-      !> Modes faster than a given rate.
-      subroutine modes_interface(self, q, slowest, modes, ok)
+      !> Modes of K + weight D at q that are faster than a given rate.
+      subroutine modes_interface(self, q, slowest, weight, modes, ok)
          import :: mechanical_system, stiff_modes, wp
          implicit none (type, external)
          class(mechanical_system), intent(inout) :: self
          real(wp), intent(in) :: q(:)     !! (n_dof)
          real(wp), intent(in) :: slowest  !! modes below this frequency may be left out [rad/s]
+         real(wp), intent(in) :: weight   !! of dampers beside springs [1/s]; a factor of two in it does not matter
          type(stiff_modes), intent(inout) :: modes
          logical, intent(out) :: ok
       end subroutine modes_interface
@@ -128,18 +118,6 @@ contains
       associate (unused => self, unused_t => t, unused_y => y); end associate
       values = 1.0_wp
    end subroutine event_functions
-
-   !> Make room for so many modes, if that is not what there is.
-   subroutine reserve(self, most, n_dof, n_ignorable)
-      class(stiff_modes), intent(inout) :: self
-      integer, intent(in) :: most, n_dof, n_ignorable
-
-      if (allocated(self%omega_2)) then
-         if (size(self%omega_2) == most) return
-         deallocate (self%omega_2, self%damping, self%u, self%v)
-      end if
-      allocate (self%omega_2(most), self%damping(most), self%u(most, n_dof), self%v(n_dof - n_ignorable, most))
-   end subroutine reserve
 
    !> Factor 1 - gamma df/dy. Nothing depends on the quadratures; their rows are left out, so that a system with them is
    !> solved to the last bit as one without. Their own correction is within the tolerance of the iteration.

@@ -1,0 +1,134 @@
+!> Stiff modes of a mechanical system, which an integrator solves implicitly (`rodyn_modal_reply`).
+module rodyn_stiff_modes
+   use rodyn_kinds, only: wp
+   use rodyn_lanes, only: s => lanes
+   use rodyn_lane_algebra, only: project, project_pair, expand
+   implicit none (type, external)
+   private
+   public :: stiff_modes
+
+   !> The stiff part of M(q) p' = ... - K q - D p near a configuration, in modes that are orthogonal for K + w D:
+   !>     M^-1 (K + w D) ~ sum square_i u_i v_i^T,   v_i^T u_j = delta_ij,
+   !>     M^-1 D ~ sum square_i (grip_i . grip_j) u_i v_j^T.
+   !> `grip_i` is how mode i moves the dampers, D = G G^T, grip_i = G^T u_i. If dampers are weak, or much stronger than the
+   !> springs, the modes are nearly orthogonal for both. Else they are `coupled`: the products of different modes matter, too.
+   type :: stiff_modes
+      integer :: n = 0                       !! modes; their number changes, so the arrays have room for `most`
+      integer :: n_dampers = 0
+      logical :: coupled = .false.
+      real(wp) :: weight = 0.0_wp            !! w [1/s]
+      real(wp), allocatable :: square(:)     !! (most) [1/s^2]
+      real(wp), allocatable :: damping(:)    !! square_i grip_i . grip_i (most) [1/s]
+      real(wp), allocatable :: u(:, :)       !! shapes, transposed (most, n_dof)
+      real(wp), allocatable :: v(:, :)       !! their duals, without ignorable coordinates (n_dof - n_ignorable, most)
+      real(wp), allocatable :: grip(:, :)    !! (most, n_dampers) [s^1/2]
+      real(wp), allocatable :: grip_t(:, :)  !! the same, transposed
+      real(wp), allocatable, private :: work(:), grips(:), lane_grips(:, :) !! (most), (n_dampers), (lanes, n_dampers)
+   contains
+      procedure :: reserve
+      procedure :: omega_2
+      procedure :: fastest
+      procedure :: stiff_rates
+      procedure :: stiff_line
+   end type stiff_modes
+
+contains
+
+   !> Make room for so many modes and dampers, if that is not what there is.
+   subroutine reserve(self, most, n_dof, n_ignorable, n_dampers)
+      class(stiff_modes), intent(inout) :: self
+      integer, intent(in) :: most, n_dof, n_ignorable, n_dampers
+
+      if (allocated(self%square)) then
+         if (size(self%square) == most .and. self%n_dampers == n_dampers) return
+         deallocate (self%square, self%damping, self%u, self%v, self%grip, self%grip_t, self%work, self%grips, self%lane_grips)
+      end if
+      self%n_dampers = n_dampers
+      allocate (self%square(most), self%damping(most), self%u(most, n_dof), self%v(n_dof - n_ignorable, most), &
+                self%grip(most, n_dampers), self%grip_t(n_dampers, most), self%work(most), self%grips(n_dampers), &
+                self%lane_grips(s, n_dampers))
+   end subroutine reserve
+
+   !> Square of the frequency of mode i by springs alone [rad^2/s^2].
+   pure real(wp) function omega_2(self, i)
+      class(stiff_modes), intent(in) :: self
+      integer, intent(in) :: i
+      omega_2 = self%square(i) - self%weight*self%damping(i)
+   end function omega_2
+
+   !> The fastest rate, dampers included as far as their weight does [rad/s].
+   pure real(wp) function fastest(self)
+      class(stiff_modes), intent(in) :: self
+      fastest = 0.0_wp
+      if (self%n > 0) fastest = sqrt(maxval(self%square(:self%n)))
+   end function fastest
+
+   !> What stiff forces take from the accelerations at several states at once, in modes: v.M^-1 (K q + D p).
+   subroutine stiff_rates(self, q, p, rates, work)
+      class(stiff_modes), intent(inout) :: self
+      real(wp), contiguous, intent(in) :: q(:, :), p(:, :)  !! (lanes, n_dof - n_ignorable)
+      real(wp), contiguous, intent(out) :: rates(:, :)      !! (lanes, most)
+      real(wp), contiguous, intent(inout) :: work(:, :)     !! (lanes, most)
+      integer :: i, l
+
+      call project(size(q, 2), self%n, self%v, q, rates)
+      call project(size(q, 2), self%n, self%v, p, work)
+      if (.not. self%coupled) then
+         do i = 1, self%n
+            rates(:, i) = self%omega_2(i)*rates(:, i) + self%damping(i)*work(:, i)
+         end do
+         return
+      end if
+      do i = 1, self%n
+         !$omp simd
+         do l = 1, s
+            work(l, i) = work(l, i) - self%weight*rates(l, i)
+         end do
+      end do
+      self%lane_grips = 0.0_wp
+      call expand(self%n_dampers, self%n, size(self%grip, 1), self%grip, work, self%lane_grips)
+      call expand(self%n, self%n_dampers, self%n_dampers, self%grip_t, self%lane_grips, rates)
+      do i = 1, self%n
+         rates(:, i) = self%square(i)*rates(:, i)
+      end do
+   end subroutine stiff_rates
+
+   !> The same at one state in uniform motion: v.M^-1 (K (q + t p) + D p) = offset + t slope.
+   subroutine stiff_line(self, q, p, offset, slope)
+      class(stiff_modes), intent(inout) :: self
+      real(wp), contiguous, intent(in) :: q(:), p(:)             !! (n_dof - n_ignorable)
+      real(wp), contiguous, intent(out) :: offset(:), slope(:)   !! (most)
+      integer :: i
+
+      call project_pair(size(q), self%n, self%v, q, p, offset, slope)
+      associate (n => self%n, w => self%weight)
+         if (.not. self%coupled) then
+            do i = 1, n
+               offset(i) = self%omega_2(i)*offset(i) + self%damping(i)*slope(i)
+               slope(i) = self%omega_2(i)*slope(i)
+            end do
+            return
+         end if
+         self%work(:n) = slope(:n) - w*offset(:n)
+         call grip_all(self)
+         do i = 1, n
+            offset(i) = self%square(i)*(offset(i) + dot_product(self%grip_t(:, i), self%grips))
+         end do
+         self%work(:n) = slope(:n)
+         call grip_all(self)
+         do i = 1, n
+            slope(i) = self%square(i)*(slope(i) - w*dot_product(self%grip_t(:, i), self%grips))
+         end do
+      end associate
+   end subroutine stiff_line
+
+   !> What all modes together, each by its `work`, do to the dampers.
+   subroutine grip_all(self)
+      class(stiff_modes), intent(inout) :: self
+      integer :: k
+      do k = 1, self%n_dampers
+         self%grips(k) = dot_product(self%grip(:self%n, k), self%work(:self%n))
+      end do
+   end subroutine grip_all
+
+end module rodyn_stiff_modes
