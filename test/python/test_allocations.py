@@ -23,7 +23,7 @@ RODYN = os.environ.get("RODYN", str(ROOT / "bin" / "rodyn"))
 # more digits), and the compressed rows, whose number of bytes depends on their values.
 TOLERANCE = 40
 
-# The number of modes that `gauss` takes for stiff changes a few times in a run, with ten arrays each time.
+# The number of modes that `gauss` takes for stiff changes a few times in a run, with up to some thirty arrays each time.
 CHANGES_OF_MODES = 40
 
 # Jacobians may allocate: about ten work arrays for each of their columns (8 to 9 n were counted for n states). CVODE asks for
@@ -65,6 +65,7 @@ SCENES = {
     "flexible": ("dynamic", "distributed", "hinge_damping = 0.02, kink = 0, 0.05, 0", True),
     "three shapes": ("dynamic", "distributed", "hinge_damping = 0.02, kink = 0, 0.05, 0", True),
     "no ledger": ("dynamic", "distributed", "hinge_damping = 0.02", False),
+    "strong dampers": ("dynamic", "distributed", "hinge_damping = 20", True), # couple the modes of gauss
     "rigid": ("rigid", "distributed", "hinge_damping = 0.02, kink = 0, 0.05, 0", True),
     "lumped": ("rigid", "lumped", "hinge_damping = 0.02", True),
     "quasistatic": ("quasistatic", "lumped", "hinge_damping = 0.02, kink = 0, 0.05, 0", True),

@@ -201,6 +201,7 @@ contains
       end if
       ok = .true.
       modes%n = 0
+      modes%coupled = .false.
       if (.not. self%modes%available) then
          call modes%reserve(0, self%n_dof, self%n_ignorable, 0)
          return

@@ -29,6 +29,7 @@ module rodyn_scene_modes
       logical :: available = .false.
       type(assembled_system) :: system
       real(wp) :: weight = 0.0_wp            !! w in what was factored [1/s]
+      real(wp) :: least_weight = 0.0_wp      !! where the step is unknown [1/s]
       real(wp) :: relaxation = 0.0_wp        !! largest ratio of a damper to its spring; 0: no dampers [s]
       real(wp), allocatable :: columns(:, :) !! B, and below it L Q with Q of the last modes (2 n_dof, rank)
       real(wp), allocatable :: dampers(:, :) !! G, D = G G^T (n_dof, rank of D)
@@ -51,7 +52,7 @@ contains
       allocate (finder%work(scene%n_dof))
       call first_weight(finder, scene)
       call factor_dampers(finder)
-      call factor(finder, finder%weight)
+      call factor(finder, finder%least_weight)
       finder%available = size(finder%squares) > 0
    end subroutine new_modes_finder
 
@@ -60,16 +61,20 @@ contains
       type(modes_finder), intent(inout) :: self
       type(scene_type), intent(in) :: scene
       real(wp), parameter :: small = 1.0e-3_wp
-      logical :: damped(scene%n)
+      real(wp) :: time, longest !! relaxation of a damper by its spring; the longest [s]
+      integer :: k
 
-      associate (stiffness => scene%hinges%stiffness, damping => scene%hinges%damping)
-         damped = damping > 0.0_wp .and. .not. scene%hinges%locked
-         if (.not. any(damped)) return
-         self%relaxation = maxval(damping/max(stiffness, tiny(1.0_wp)/epsilon(1.0_wp), epsilon(1.0_wp)*damping), mask=damped)
-         self%weight = 1.0_wp
-         if (any(damped .and. stiffness > 0.0_wp)) &
-            self%weight = small*minval(stiffness/damping, mask=damped .and. stiffness > 0.0_wp)
+      longest = 0.0_wp
+      associate (stiffness => scene%hinges%stiffness, damping => scene%hinges%damping, locked => scene%hinges%locked)
+         do k = lbound(damping, 1), ubound(damping, 1)
+            if (locked(k) .or. .not. damping(k) > 0.0_wp) cycle
+            time = damping(k)/max(stiffness(k), epsilon(1.0_wp)*damping(k))
+            self%relaxation = max(self%relaxation, time)
+            if (stiffness(k) > 0.0_wp) longest = max(longest, time)
+         end do
       end associate
+      if (self%relaxation > 0.0_wp) self%least_weight = 1.0_wp
+      if (longest > 0.0_wp) self%least_weight = small/max(longest, 1.0e-100_wp)
    end subroutine first_weight
 
    !> G of D = G G^T.
@@ -125,9 +130,11 @@ contains
       real(wp), intent(in) :: weight               !! 0: unknown [1/s]
       type(stiff_modes), intent(inout) :: modes
       logical, intent(out) :: ok
+      real(wp) :: wanted
       integer :: info, i, m, rank
 
-      if (weight_matters(self, weight)) call factor(self, weight)
+      wanted = merge(weight, self%least_weight, weight > 0.0_wp)
+      if (weight_matters(self, wanted)) call factor(self, wanted)
       m = scene%n_dof
       rank = size(self%columns, 2)
       call mass_matrix(self%system, scene, sine, cosine, q)
@@ -163,8 +170,8 @@ contains
    !> Whether modes for this weight of dampers are others than those of the weight that was factored.
    pure logical function weight_matters(self, weight)
       type(modes_finder), intent(in) :: self
-      real(wp), intent(in) :: weight !! 0: unknown [1/s]
-      weight_matters = weight > 0.0_wp .and. max(weight, self%weight)*self%relaxation > little .and. &
+      real(wp), intent(in) :: weight !! [1/s]
+      weight_matters = max(weight, self%weight)*self%relaxation > little .and. &
                        (weight > 4.0_wp*self%weight .or. weight < 0.25_wp*self%weight)
    end function weight_matters
 
@@ -197,7 +204,7 @@ contains
       integer :: i, k, m, most
 
       m = size(self%dampers, 1)
-      most = size(modes%square)
+      most = max(1, size(modes%square))
       do k = 1, modes%n_dampers
          call dgemv('N', modes%n, m, 1.0_wp, modes%u, most, self%dampers(:, k), 1, 0.0_wp, modes%grip(:, k), 1)
       end do
@@ -207,8 +214,8 @@ contains
       end do
    end subroutine add_dampers
 
-   !> How much dampers couple modes in a step whose h lambda is 1/weight: the largest norm of a row, its diagonal left out, of
-   !> (1 + h lambda D + h^2 lambda^2 K), made symmetric and with ones on its diagonal.
+   !> How much dampers couple modes in a step whose h lambda has the size 1/weight: the largest norm of a row of h lambda D without
+   !> its diagonal, in units that make the diagonal of 1 + h^2 lambda^2 (K + w D) one. (What couples K is as large.)
    pure real(wp) function coupling(modes, weight)
       type(stiff_modes), intent(in) :: modes
       real(wp), intent(in) :: weight !! [1/s]

@@ -3,10 +3,10 @@
 !> The accelerations at the nodes, F, solve F_i = f(t_i, Q_i, P_i) with
 !>     P = p + h A F,   Q = q + c h p + h^2 A^2 F.
 !> Fixed-point iteration would need steps far below the period of the fastest vibration. Those vibrations are nearly
-!> linear, so each correction solves them implicitly: with the stiff modes (omega, u, v) of `rodyn_ode`, the residual
-!> R = f - F is answered by
-!>     dF = R - sum u G R.v,   G = 1 - (1 + h damping A + h^2 omega^2 A^2)^-1,
-!> and the first guess extrapolates only f + sum u (omega^2 v.Q + damping v.P), which is smooth. Three or four iterations
+!> linear, so each correction solves them implicitly: with the stiff modes (u, v) of `rodyn_stiff_modes`, in which K and D are
+!> springs and dampers, the residual R = f - F is answered by
+!>     dF = R - u G v.R,   G = 1 - (1 + h D A + h^2 K A^2)^-1   (`rodyn_modal_reply`),
+!> and the first guess extrapolates only N = f + u (K v.Q + D v.P), which is smooth. Three or four iterations
 !> are enough for steps of half a period. The modes are those of a configuration some steps ago; they are found anew
 !> when the iterations they cost exceed what finding them does.
 !>
@@ -171,6 +171,8 @@ contains
       associate (span => self%t_stop - t)
          if (self%options%fixed_step > 0.0_wp) then
             self%n_grid = max(1_i8, ceiling(span/self%options%fixed_step*(1.0_wp - 4.0_wp*epsilon(1.0_wp)), i8))
+            self%h = span/real(self%n_grid, wp)
+            call search_modes(self, self%h, error)
             return
          end if
          fastest = self%modes%fastest()
@@ -340,7 +342,7 @@ contains
 
       slowest = 0.0_wp
       weight = 0.0_wp
-      if (h > 0.0_wp) slowest = smallest_phase/h
+      if (h > 0.0_wp .and. self%n_grid == 0) slowest = smallest_phase/h
       if (h > 0.0_wp) weight = 1.0_wp/(typical_lambda*h)
       call self%mechanics%find_modes(self%y(:self%mechanics%n_dof), slowest, weight, self%modes, ok)
       self%counts%n_jac = self%counts%n_jac + 1
@@ -359,6 +361,7 @@ contains
          if (.not. allocated(self%modal)) &
             allocate (self%modal(s, most), self%reply(s, most), self%stiff(s, most), self%rest(most), self%motion(most))
       end associate
+      if (self%i_grid == 0) self%has_history = .false. ! no step has been accepted that could be restored
       if (self%has_history) then
          call restore_nodes(self, self%last)
          call remove_stiff_part(self, self%last)
@@ -460,7 +463,7 @@ contains
       self%has_history = .true.
    end subroutine begin_history
 
-   !> smooth = F + sum u (omega^2 v.Q + damping v.P).
+   !> smooth = F + u (K v.Q + D v.P).
    subroutine remove_stiff_part(self, record)
       class(gauss_integrator), intent(inout) :: self
       type(step_record), intent(inout) :: record
@@ -486,8 +489,8 @@ contains
 
    !> Solve for F of `trial` from its first guess. Q and P follow, but for the last correction where nobody asks for it.
    !>
-   !> What F has beside the stiff part, N = F + sum u (omega^2 v.Q + damping v.P), follows from the residuals alone: the
-   !> correction that answers R changes N by R, since (1 - G)(1 + h damping A + h^2 omega^2 A^2) = 1.
+   !> What F has beside the stiff part, N = F + u (K v.Q + D v.P), follows from the residuals alone: the
+   !> correction that answers R changes N by R, since (1 - G)(1 + h D A + h^2 K A^2) = 1.
    subroutine iterate(self, t, y, ok)
       class(gauss_integrator), intent(inout) :: self
       real(wp), contiguous, intent(in) :: y(:)

@@ -2,10 +2,10 @@
 !>
 !> The measure is the time to the end of the run at the user's tolerances, by which all methods bring the chord angles to some
 !> ten times rtol or better (docs/performance.md, "Large and stiff"). Vibrations that the tolerances resolve must be followed
-!> by any method, and the cheapest steps win: collocation of order 16 for short chains, else explicit steps of order 8. Strong
-!> dampers, or rods so stiff that their vibrations drown in the tolerances, call for BDF. How much of a fast vibration is
-!> excited depends on loads and initial values, so where the fastest rates are far above those of the chain of rods, the
-!> methods are tried on the beginning of the run.
+!> by any method, and the cheapest steps win: collocation of order 16 for short chains, else explicit steps of order 8. Long
+!> chains with strong dampers, or rods so stiff that their vibrations drown in the tolerances, call for BDF. How much of a fast
+!> vibration is excited depends on loads and initial values, so where the fastest rates are far above those of the chain of rods,
+!> the methods are tried on the beginning of the run.
 module rodyn_method_choice
    use rodyn_kinds, only: wp
    use rodyn_text, only: to_text, formatted
@@ -128,7 +128,7 @@ contains
 
    !> Efforts of explicit steps of order 8 and of collocation, by their steps (docs/performance.md). What the fast vibrations add
    !> to the motion of the chain is nearly linear, so the faster they are, the fewer iterations a step of collocation needs.
-   !> It is out of the question (huge) where it has no lanes or modes or hinges have events.
+   !> It is out of the question (huge) where it has no lanes or modes, hinges have events, or nothing vibrates.
    function expected_efforts(scene, options, rates, ratio, t_end) result(effort)
       type(scene_type), intent(in) :: scene
       type(solver_options), intent(in) :: options
@@ -141,12 +141,13 @@ contains
       effort(1) = explicit_step*expected_steps('dop853', options, rates, t_end)
       effort(2) = huge(1.0_wp)
       if (scene%assembled .or. scene%n_q > scene%n_dof .or. scene%n_dof > most_dof .or. size(scene%hinges%mechanisms) > 0) return
+      if (.not. rates%frequency > 0.0_wp) return
       iterations = 4.5_wp
       if (ratio > 1.0_wp) iterations = max(1.2_wp, 8.0_wp*ratio**(-0.2_wp))
       if (vibrating(rates, t_end) < 1.0_wp) iterations = damped_iterations(rates, options%rtol)
-      effort(2) = effort_of_modes(scene, merge(4, 2, vibrating(rates, t_end) < 1.0_wp)) + &
-                  (collocation_step + iterations*effort_of_nodes(scene))*expected_steps('gauss', options, rates, t_end)
+      effort(2) = (collocation_step + iterations*effort_of_nodes(scene))*expected_steps('gauss', options, rates, t_end)
       if (rates%decay > coupling_decay*rates%frequency) effort(2) = effort(2)*(1.0_wp + effort_of_coupling(scene))
+      effort(2) = effort(2) + effort_of_modes(scene, merge(4, 2, vibrating(rates, t_end) < 1.0_wp))
    end function expected_efforts
 
    !> Iterations of a collocation step where dampers calm the vibrations, which allows longer steps: a fit to 190 measured scenes,

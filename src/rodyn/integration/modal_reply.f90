@@ -6,8 +6,8 @@
 !>     Z = d + a square G G^T,   d = 1 + h^2 lambda^2 square,   a = h lambda - w h^2 lambda^2,
 !> whose inverse needs that of a matrix over the dampers only (Sherman, Morrison & Woodbury):
 !>     Z^-1 = d^-1 - d^-1 a square G S^-1 G^T d^-1,   S = 1 + G^T d^-1 a square G.
-!> The first k rows and columns of S belong to a system that has its other dampers in proportion to the springs. It has a
-!> solution, so that elimination needs no search for pivots.
+!> The first k rows and columns of S belong to a system in which springs of w times the strength stand for the other dampers. It
+!> has a solution, so that elimination needs no search for pivots.
 module rodyn_modal_reply
    use rodyn_kinds, only: wp
    use rodyn_lanes, only: s => lanes

@@ -66,7 +66,7 @@ module rodyn_ode
          class(mechanical_system), intent(inout) :: self
          real(wp), intent(in) :: q(:)     !! (n_dof)
          real(wp), intent(in) :: slowest  !! modes below this frequency may be left out [rad/s]
-         real(wp), intent(in) :: weight   !! of dampers beside springs [1/s]; a factor of two in it does not matter
+         real(wp), intent(in) :: weight   !! of dampers beside springs [1/s]; a factor of four in it does not matter
          type(stiff_modes), intent(inout) :: modes
          logical, intent(out) :: ok
       end subroutine modes_interface
