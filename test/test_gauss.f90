@@ -230,6 +230,7 @@ contains
       modes%grip(3, 2) = 0.5_wp
       modes%grip_t = transpose(modes%grip)
       modes%damping = modes%square*sum(modes%grip**2, dim=2)
+      modes%omega_2 = modes%square - modes%weight*modes%damping
       call modal%prepare(rule, modes, h)
       call modal%answer(rule, modes, residuals, reply)
       x = reshape(reply, [m, 1])

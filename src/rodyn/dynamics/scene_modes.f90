@@ -162,6 +162,7 @@ contains
       modes%weight = self%weight
       modes%coupled = .false.
       modes%damping = 0.0_wp
+      modes%omega_2(:modes%n) = modes%square(:modes%n)
       if (.not. self%relaxation > 0.0_wp) return
       call add_dampers(self, modes)
       modes%coupled = weight > 0.0_wp .and. coupling(modes, weight) > much
@@ -211,6 +212,7 @@ contains
       do i = 1, modes%n
          modes%grip_t(:, i) = modes%grip(i, :)
          modes%damping(i) = modes%square(i)*dot_product(modes%grip_t(:, i), modes%grip_t(:, i))
+         modes%omega_2(i) = modes%square(i) - modes%weight*modes%damping(i)
       end do
    end subroutine add_dampers
 

@@ -18,6 +18,7 @@ module rodyn_stiff_modes
       logical :: coupled = .false.
       real(wp) :: weight = 0.0_wp            !! w [1/s]
       real(wp), allocatable :: square(:)     !! (most) [1/s^2]
+      real(wp), allocatable :: omega_2(:)    !! square_i - w damping_i: by springs alone (most) [rad^2/s^2]
       real(wp), allocatable :: damping(:)    !! square_i grip_i . grip_i (most) [1/s]
       real(wp), allocatable :: u(:, :)       !! shapes, transposed (most, n_dof)
       real(wp), allocatable :: v(:, :)       !! their duals, without ignorable coordinates (n_dof - n_ignorable, most)
@@ -26,7 +27,6 @@ module rodyn_stiff_modes
       real(wp), allocatable, private :: work(:), grips(:), lane_grips(:, :) !! (most), (n_dampers), (lanes, n_dampers)
    contains
       procedure :: reserve
-      procedure :: omega_2
       procedure :: fastest
       procedure :: stiff_rates
       procedure :: stiff_line
@@ -41,20 +41,14 @@ contains
 
       if (allocated(self%square)) then
          if (size(self%square) == most .and. self%n_dampers == n_dampers) return
-         deallocate (self%square, self%damping, self%u, self%v, self%grip, self%grip_t, self%work, self%grips, self%lane_grips)
+         deallocate (self%square, self%omega_2, self%damping, self%u, self%v, self%grip, self%grip_t, self%work, self%grips, &
+                     self%lane_grips)
       end if
       self%n_dampers = n_dampers
-      allocate (self%square(most), self%damping(most), self%u(most, n_dof), self%v(n_dof - n_ignorable, most), &
+      allocate (self%square(most), self%omega_2(most), self%damping(most), self%u(most, n_dof), self%v(n_dof - n_ignorable, most), &
                 self%grip(most, n_dampers), self%grip_t(n_dampers, most), self%work(most), self%grips(n_dampers), &
                 self%lane_grips(s, n_dampers))
    end subroutine reserve
-
-   !> Square of the frequency of mode i by springs alone [rad^2/s^2].
-   pure real(wp) function omega_2(self, i)
-      class(stiff_modes), intent(in) :: self
-      integer, intent(in) :: i
-      omega_2 = self%square(i) - self%weight*self%damping(i)
-   end function omega_2
 
    !> The fastest rate, dampers included as far as their weight does [rad/s].
    pure real(wp) function fastest(self)
