@@ -29,6 +29,7 @@ contains
          new_test('steps far beyond the stiffest vibration keep the slow motion', test_stiff), &
          new_test('modes that dampers couple answer as the equations of all nodes at once', test_coupled), &
          new_test('dampers of any strength cost no more than 7 iterations a step', test_dampers), &
+         new_test('fixed steps bear strong dampers', test_fixed_with_dampers), &
          new_test('dampers alone hold a free hinge', test_free_hinge), &
          new_test('relaxing joints are refused by name', test_refused)]
    end subroutine collect_gauss
@@ -269,6 +270,31 @@ contains
          if (allocated(error)) return
       end do
    end subroutine test_dampers
+
+   !> Fixed steps know their length before the first one.
+   subroutine test_fixed_with_dampers(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+      type(trajectory) :: exact, motion
+
+      call table1_case(config, error)
+      if (allocated(error)) return
+      config%chain%hinge_damping = 1.0e5_wp*config%chain%hinge_damping
+      config%solver%method = 'bdf'
+      config%solver%rtol = 1.0e-11_wp
+      config%solver%atol = 1.0e-13_wp
+      call integrate(config, [0.1_wp], exact, error)
+      if (allocated(error)) return
+      config%solver%method = 'gauss'
+      config%solver%rtol = 1.0e-9_wp
+      config%solver%atol = 1.0e-9_wp
+      config%solver%fixed_step = 1.0e-3_wp
+      call integrate(config, [0.1_wp], motion, error)
+      if (allocated(error)) return
+      call check_close(error, motion%rows(1)%phi, exact%rows(1)%phi, 1.0e-6_wp, 'phi')
+      if (allocated(error)) return
+      call check(error, motion%counts%n_steps == 100 .and. motion%counts%n_rhs < 6*lanes*100, 'effort')
+   end subroutine test_fixed_with_dampers
 
    !> No spring in a hinge, but a strong damper: it is no part of the stiffness.
    subroutine test_free_hinge(error)
