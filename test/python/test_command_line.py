@@ -386,8 +386,11 @@ def test_a_run_says_how_large_it_is_and_which_method_it_takes(results, scene, si
 
 
 def test_strong_dampers_call_for_an_implicit_method(tmp_path):
-    case = write_case(tmp_path, TIMES + SPACECRAFT + CHAIN.replace(" /\n", ", hinge_damping = 5e4 /\n") + MOMENT)
-    lines = printed(rodyn("run", case, cwd=tmp_path).stdout)
+    damped = CHAIN.replace(" /\n", ", hinge_damping = 5e4 /\n")
+    lines = printed(rodyn("run", write_case(tmp_path, TIMES + SPACECRAFT + damped + MOMENT), cwd=tmp_path).stdout)
+    assert re.match(r"gauss: auto: .*: collocation, order 16, about \d+ steps", lines["method"])
+    stiff = damped.replace("bending_stiffness = 1.37e4", "bending_stiffness = 1e9") + "&solver rtol = 1e-3, atol = 1e-5 /\n"
+    lines = printed(rodyn("run", write_case(tmp_path, TIMES + SPACECRAFT + stiff + MOMENT, "stiff.nml"), cwd=tmp_path).stdout)
     assert re.match(r"bdf: auto: .*: stiff, implicit", lines["method"])
 
 
