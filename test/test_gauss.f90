@@ -253,15 +253,7 @@ contains
          call table1_case(config, error)
          if (allocated(error)) return
          config%chain%hinge_damping = 10.0_wp**i*config%chain%hinge_damping
-         config%solver%method = merge('dop853', 'bdf   ', i < 4)
-         config%solver%rtol = 1.0e-11_wp
-         config%solver%atol = 1.0e-13_wp
-         call integrate(config, [0.1_wp], exact, error)
-         if (allocated(error)) return
-         config%solver%method = 'gauss'
-         config%solver%rtol = 1.0e-8_wp
-         config%solver%atol = 1.0e-8_wp
-         call integrate(config, [0.1_wp], motion, error)
+         call integrate_both(config, merge('dop853', 'bdf   ', i < 4), 1.0e-8_wp, 0.0_wp, exact, motion, error)
          if (allocated(error)) return
          write (text, '(a, i0, 2(a, i0))') 'D times 1e', i, ': steps ', motion%counts%n_steps, ', rhs ', motion%counts%n_rhs
          call check_close(error, motion%rows(1)%phi, exact%rows(1)%phi, 1.0e-8_wp, text)
@@ -270,6 +262,26 @@ contains
          if (allocated(error)) return
       end do
    end subroutine test_dampers
+
+   !> To 0.1 s by a reference method at a tight tolerance, and by `gauss`.
+   subroutine integrate_both(config, reference, tolerance, fixed_step, exact, motion, error)
+      type(case_config), intent(inout) :: config
+      character(len=*), intent(in) :: reference
+      real(wp), intent(in) :: tolerance, fixed_step !! of `gauss`; 0: adaptive
+      type(trajectory), intent(out) :: exact, motion
+      type(error_type), allocatable, intent(out) :: error
+
+      config%solver%method = reference
+      config%solver%rtol = 1.0e-11_wp
+      config%solver%atol = 1.0e-13_wp
+      call integrate(config, [0.1_wp], exact, error)
+      if (allocated(error)) return
+      config%solver%method = 'gauss'
+      config%solver%rtol = tolerance
+      config%solver%atol = tolerance
+      config%solver%fixed_step = fixed_step
+      call integrate(config, [0.1_wp], motion, error)
+   end subroutine integrate_both
 
    !> Fixed steps know their length before the first one.
    subroutine test_fixed_with_dampers(error)
@@ -280,16 +292,7 @@ contains
       call table1_case(config, error)
       if (allocated(error)) return
       config%chain%hinge_damping = 1.0e5_wp*config%chain%hinge_damping
-      config%solver%method = 'bdf'
-      config%solver%rtol = 1.0e-11_wp
-      config%solver%atol = 1.0e-13_wp
-      call integrate(config, [0.1_wp], exact, error)
-      if (allocated(error)) return
-      config%solver%method = 'gauss'
-      config%solver%rtol = 1.0e-9_wp
-      config%solver%atol = 1.0e-9_wp
-      config%solver%fixed_step = 1.0e-3_wp
-      call integrate(config, [0.1_wp], motion, error)
+      call integrate_both(config, 'bdf', 1.0e-9_wp, 1.0e-3_wp, exact, motion, error)
       if (allocated(error)) return
       call check_close(error, motion%rows(1)%phi, exact%rows(1)%phi, 1.0e-6_wp, 'phi')
       if (allocated(error)) return
@@ -306,15 +309,7 @@ contains
       if (allocated(error)) return
       config%chain%hinge_stiffness(2) = 0.0_wp
       config%chain%hinge_damping = 100.0_wp
-      config%solver%method = 'bdf'
-      config%solver%rtol = 1.0e-11_wp
-      config%solver%atol = 1.0e-13_wp
-      call integrate(config, [0.1_wp], exact, error)
-      if (allocated(error)) return
-      config%solver%method = 'gauss'
-      config%solver%rtol = 1.0e-8_wp
-      config%solver%atol = 1.0e-8_wp
-      call integrate(config, [0.1_wp], motion, error)
+      call integrate_both(config, 'bdf', 1.0e-8_wp, 0.0_wp, exact, motion, error)
       if (allocated(error)) return
       call check_close(error, motion%rows(1)%phi, exact%rows(1)%phi, 1.0e-8_wp, 'phi')
       if (allocated(error)) return

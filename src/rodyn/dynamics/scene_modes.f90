@@ -19,10 +19,10 @@ module rodyn_scene_modes
    public :: modes_finder, new_modes_finder, most_dof
 
    integer, parameter :: most_dof = 200 !! beyond, eigenvectors cost more than they bring
-   real(wp), parameter :: negligible = 1.0e-5_wp !! b_i.b_j, of the smaller square; likewise if dampers matter, whose squares
-   real(wp), parameter :: damped_negligible = 1.0e-9_wp !! may be large
-   real(wp), parameter :: little = 0.2_wp      !! of dampers beside springs: their weight is of no importance
-   real(wp), parameter :: much = 0.03_wp         !! coupling of modes by dampers that matters
+   real(wp), parameter :: negligible = 1.0e-5_wp !! b_i.b_j, of the smaller square
+   real(wp), parameter :: damped_negligible = 1.0e-9_wp !! likewise where dampers matter, whose squares may be large
+   real(wp), parameter :: little = 0.2_wp !! of dampers beside springs: their weight is of no importance
+   real(wp), parameter :: much = 0.03_wp  !! coupling of modes by dampers that matters
 
    !> What stays constant of a scene, and memory.
    type :: modes_finder
@@ -159,11 +159,6 @@ contains
          end do
       end if
       call keep_fast_modes(self, scene%n_base, slowest, modes)
-      modes%weight = self%weight
-      modes%coupled = .false.
-      modes%damping = 0.0_wp
-      modes%omega_2(:modes%n) = modes%square(:modes%n)
-      if (.not. self%relaxation > 0.0_wp) return
       call add_dampers(self, modes)
       modes%coupled = weight > 0.0_wp .and. coupling(modes, weight) > much
    end subroutine find
@@ -198,7 +193,7 @@ contains
       modes%n = j
    end subroutine keep_fast_modes
 
-   !> How each mode moves the dampers.
+   !> How each mode moves the dampers, and what springs and dampers have of its square.
    subroutine add_dampers(self, modes)
       type(modes_finder), intent(in) :: self
       type(stiff_modes), intent(inout) :: modes
@@ -206,6 +201,7 @@ contains
 
       m = size(self%dampers, 1)
       most = max(1, size(modes%square))
+      modes%weight = self%weight
       do k = 1, modes%n_dampers
          call dgemv('N', modes%n, m, 1.0_wp, modes%u, most, self%dampers(:, k), 1, 0.0_wp, modes%grip(:, k), 1)
       end do
@@ -224,6 +220,7 @@ contains
       real(wp) :: row
       integer :: i, j
       coupling = 0.0_wp
+      if (modes%n_dampers == 0) return
       do i = 1, modes%n
          row = 0.0_wp
          do j = 1, modes%n

@@ -166,20 +166,19 @@ contains
       self%i_grid = 0
       self%n_grid = 0
       self%now%h = 0.0_wp
-      call search_modes(self, 0.0_wp, error)
-      if (allocated(error)) return
       associate (span => self%t_stop - t)
          if (self%options%fixed_step > 0.0_wp) then
             self%n_grid = max(1_i8, ceiling(span/self%options%fixed_step*(1.0_wp - 4.0_wp*epsilon(1.0_wp)), i8))
             self%h = span/real(self%n_grid, wp)
-            call search_modes(self, self%h, error)
-            return
+         else
+            call search_modes(self, 0.0_wp, error)
+            if (allocated(error)) return
+            fastest = self%modes%fastest()
+            self%h = span
+            if (fastest*span > first_phase) self%h = first_phase/fastest
+            if (self%modes%n == 0) self%h = 1.0e-3_wp*span
+            if (self%options%max_step > 0.0_wp) self%h = min(self%h, self%options%max_step)
          end if
-         fastest = self%modes%fastest()
-         self%h = span
-         if (fastest*span > first_phase) self%h = first_phase/fastest
-         if (self%modes%n == 0) self%h = 1.0e-3_wp*span
-         if (self%options%max_step > 0.0_wp) self%h = min(self%h, self%options%max_step)
       end associate
       call search_modes(self, self%h, error)
    end subroutine start
