@@ -8,6 +8,10 @@ module test_gauss
    use rodyn_stiff_modes, only: stiff_modes
    use rodyn_modal_reply, only: modal_reply
    use rodyn_lapack, only: dgesv
+   use rodyn_scene, only: scene_type, new_scene
+   use rodyn_motion, only: motion_type, new_motion, initial_state
+   use rodyn_integrator, only: solver_options
+   use rodyn_gauss_integrator, only: gauss_integrator, new_gauss_integrator
    use test_testing, only: unittest, new_test, check, check_close
    use test_random_scenes, only: random_case, seed_random, kind_name, n_kinds
    use rodyn_case_reader, only: read_case
@@ -31,6 +35,7 @@ contains
          new_test('dampers of any strength cost no more than 7 iterations a step', test_dampers), &
          new_test('fixed steps bear strong dampers', test_fixed_with_dampers), &
          new_test('dampers alone hold a free hinge', test_free_hinge), &
+         new_test('a run does not depend on the one before', test_history), &
          new_test('relaxing joints are refused by name', test_refused)]
    end subroutine collect_gauss
 
@@ -282,6 +287,39 @@ contains
       config%solver%fixed_step = fixed_step
       call integrate(config, [0.1_wp], motion, error)
    end subroutine integrate_both
+
+   !> The search for modes begins with those of the search before, but not with those of another run.
+   subroutine test_history(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+      type(scene_type) :: scene
+      type(motion_type), target :: motion
+      type(gauss_integrator) :: integrator
+      real(wp), allocatable :: first(:), y(:)
+      real(wp) :: t
+      integer :: i
+
+      call table1_case(config, error)
+      if (allocated(error)) return
+      call new_scene(scene, config, error)
+      if (allocated(error)) return
+      call new_motion(motion, scene, .false., error)
+      if (allocated(error)) return
+      call motion%dynamics%set_regime(0.0_wp, 1.0_wp)
+      do i = 1, 2
+         call initial_state(motion, config%initial, y)
+         call new_gauss_integrator(integrator, motion, solver_options(rtol=1.0e-4_wp, atol=1.0e-4_wp), error)
+         if (allocated(error)) return
+         call integrator%set_stop(0.1_wp)
+         call integrator%start(0.0_wp, y, error)
+         if (allocated(error)) return
+         call integrator%advance(0.1_wp, y, t, error)
+         if (allocated(error)) return
+         call integrator%finalize()
+         if (i == 1) first = y
+      end do
+      call check(error, all(abs(y - first) <= 0.0_wp), 'another run by the same motion ends elsewhere')
+   end subroutine test_history
 
    !> Fixed steps know their length before the first one.
    subroutine test_fixed_with_dampers(error)

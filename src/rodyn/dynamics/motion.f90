@@ -44,6 +44,7 @@ module rodyn_motion
       procedure :: has_lanes
       procedure :: lane_accelerations
       procedure :: find_modes
+      procedure :: forget_modes
       procedure :: quadratures
       procedure :: factorise_newton
       procedure :: solve_newton
@@ -211,6 +212,12 @@ contains
          call self%modes%find(scene, work%sine, work%cosine, q, slowest, weight, modes, ok)
       end associate
    end subroutine find_modes
+
+   !> The next search begins from nothing, like the first.
+   subroutine forget_modes(self)
+      class(motion_type), intent(inout) :: self
+      if (allocated(self%modes)) deallocate (self%modes)
+   end subroutine forget_modes
 
    !> Power of the loads and dissipated power.
    subroutine quadratures(self, t, q, p, rate)

@@ -122,6 +122,7 @@ contains
                     "dampers = 'exact'; stops, freeplay, friction and latches of hinges, which its long steps would not see)")
          return
       end if
+      call self%mechanics%forget_modes() ! so that the result does not depend on what was integrated before
       self%system => system
       self%options = options
       if (.not. rule_is_made) call new_gauss_collocation(made_rule)

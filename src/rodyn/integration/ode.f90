@@ -37,6 +37,7 @@ module rodyn_ode
       procedure(can_interface), deferred :: has_lanes
       procedure(lanes_interface), deferred :: lane_accelerations
       procedure(modes_interface), deferred :: find_modes
+      procedure :: forget_modes => nothing_to_forget
       procedure(quadratures_interface), deferred :: quadratures
    end type mechanical_system
 
@@ -144,5 +145,11 @@ contains
       real(wp), contiguous, intent(inout) :: x(:) !! (n_states)
       call self%dense%solve(x)
    end subroutine solve_dense
+
+   !> Forget what searches for modes keep from one to the next. By default nothing.
+   subroutine nothing_to_forget(self)
+      class(mechanical_system), intent(inout) :: self
+      associate (unused => self); end associate
+   end subroutine nothing_to_forget
 
 end module rodyn_ode
