@@ -299,14 +299,17 @@ contains
       real(wp) :: t
       integer :: i
 
-      call table1_case(config, error)
-      if (allocated(error)) return
-      call new_scene(scene, config, error)
-      if (allocated(error)) return
-      call new_motion(motion, scene, .false., error)
-      if (allocated(error)) return
-      call motion%dynamics%set_regime(0.0_wp, 1.0_wp)
-      do i = 1, 2
+      do i = 1, 4 ! two runs without, two with strong dampers, which have another matrix factored
+         if (modulo(i, 2) == 1) then
+            call table1_case(config, error)
+            if (allocated(error)) return
+            if (i > 1) config%chain%hinge_damping = 1.0e5_wp*config%chain%hinge_damping
+            call new_scene(scene, config, error)
+            if (allocated(error)) return
+            call new_motion(motion, scene, .false., error)
+            if (allocated(error)) return
+            call motion%dynamics%set_regime(0.0_wp, 1.0_wp)
+         end if
          call initial_state(motion, config%initial, y)
          call new_gauss_integrator(integrator, motion, solver_options(rtol=1.0e-4_wp, atol=1.0e-4_wp), error)
          if (allocated(error)) return
@@ -316,9 +319,10 @@ contains
          call integrator%advance(0.1_wp, y, t, error)
          if (allocated(error)) return
          call integrator%finalize()
-         if (i == 1) first = y
+         if (modulo(i, 2) == 1) first = y
+         call check(error, all(abs(y - first) <= 0.0_wp), 'another run by the same motion ends elsewhere')
+         if (allocated(error)) return
       end do
-      call check(error, all(abs(y - first) <= 0.0_wp), 'another run by the same motion ends elsewhere')
    end subroutine test_history
 
    !> Fixed steps know their length before the first one.

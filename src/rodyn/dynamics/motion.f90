@@ -216,7 +216,7 @@ contains
    !> The next search begins from nothing, like the first.
    subroutine forget_modes(self)
       class(motion_type), intent(inout) :: self
-      if (allocated(self%modes)) deallocate (self%modes)
+      if (allocated(self%modes)) call self%modes%forget()
    end subroutine forget_modes
 
    !> Power of the loads and dissipated power.

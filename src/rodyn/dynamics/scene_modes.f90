@@ -31,11 +31,13 @@ module rodyn_scene_modes
       real(wp) :: weight = 0.0_wp            !! w in what was factored [1/s]
       real(wp) :: least_weight = 0.0_wp      !! where the step is unknown [1/s]
       real(wp) :: relaxation = 0.0_wp        !! largest ratio of a damper to its spring; 0: no dampers [s]
+      real(wp), allocatable :: first(:, :)   !! L of the least weight (n_dof, rank)
       real(wp), allocatable :: columns(:, :) !! B, and below it L Q with Q of the last modes (2 n_dof, rank)
       real(wp), allocatable :: dampers(:, :) !! G, D = G G^T (n_dof, rank of D)
       real(wp), allocatable :: squares(:), work(:)
    contains
       procedure :: find
+      procedure :: forget
    end type modes_finder
 
 contains
@@ -53,6 +55,7 @@ contains
       call first_weight(finder, scene)
       call factor_dampers(finder)
       call factor(finder, finder%least_weight)
+      finder%first = finder%columns(scene%n_dof + 1:, :)
       finder%available = size(finder%squares) > 0
    end subroutine new_modes_finder
 
@@ -119,6 +122,21 @@ contains
          self%columns(m + 1:, i) = vectors(:, m - rank + i)*sqrt(values(m - rank + i))
       end do
    end subroutine factor
+
+   !> Forget the last modes: the next search begins like the first.
+   subroutine forget(self)
+      class(modes_finder), intent(inout) :: self
+
+      if (.not. self%available) return
+      self%weight = self%least_weight
+      associate (m => size(self%first, 1), rank => size(self%first, 2))
+         if (size(self%columns, 2) /= rank) then
+            deallocate (self%columns, self%squares)
+            allocate (self%columns(2*m, rank), self%squares(rank))
+         end if
+         self%columns(m + 1:, :) = self%first
+      end associate
+   end subroutine forget
 
    !> Modes at q that are faster than `slowest`, for a weight of dampers. Not `ok`: M is not positive definite.
    subroutine find(self, scene, sine, cosine, q, slowest, weight, modes, ok)
