@@ -8,12 +8,13 @@ module test_gauss
    use rodyn_stiff_modes, only: stiff_modes
    use rodyn_modal_reply, only: modal_reply
    use rodyn_lapack, only: dgesv
+   use rodyn_orthogonal_columns, only: column_rotator
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_motion, only: motion_type, new_motion, initial_state
    use rodyn_integrator, only: solver_options
    use rodyn_gauss_integrator, only: gauss_integrator, new_gauss_integrator
    use test_testing, only: unittest, new_test, check, check_close
-   use test_random_scenes, only: random_case, seed_random, kind_name, n_kinds
+   use test_random_scenes, only: random_case, seed_random, uniform, kind_name, n_kinds
    use rodyn_case_reader, only: read_case
    use test_trajectories, only: trajectory, integrate
    implicit none (type, external)
@@ -31,6 +32,7 @@ contains
          new_test('the error follows the tolerance over nine decades', test_tolerance), &
          new_test('large fixed steps keep the energy for thousands of periods', test_energy), &
          new_test('steps far beyond the stiffest vibration keep the slow motion', test_stiff), &
+         new_test('few and many columns become orthogonal by rotations, also if some are small', test_columns), &
          new_test('modes that dampers couple answer as the equations of all nodes at once', test_coupled), &
          new_test('dampers of any strength cost no more than 7 iterations a step', test_dampers), &
          new_test('fixed steps bear strong dampers', test_fixed_with_dampers), &
@@ -192,6 +194,45 @@ contains
       if (allocated(error)) return
       call check_close(error, motion%rows(1)%phi, exact%rows(1)%phi, 1.0e-5_wp, 'phi')
    end subroutine test_stiff
+
+   !> Rotations leave B B^T and C B^T, with C the rows below B.
+   subroutine test_columns(error)
+      type(error_type), allocatable, intent(out) :: error
+      integer, parameter :: m = 50, counts(*) = [8, 23, 24, 40, 40]
+      real(wp), parameter :: negligible = 1.0e-9_wp, scales(*) = [1.0_wp, 1.0e-9_wp, 1.0_wp, 1.0_wp, 1.0e-9_wp] ! of the last column
+      type(column_rotator) :: rotator
+      real(wp), allocatable :: x(:, :), squares(:)
+      real(wp) :: before(2*m, m), gram, allowed, found
+      integer :: which, i, j, n
+
+      call seed_random(311)
+      do which = 1, size(counts)
+         n = counts(which)
+         if (allocated(x)) deallocate (x, squares)
+         allocate (x(2*m, n), squares(n))
+         do j = 1, n
+            do i = 1, 2*m
+               x(i, j) = scales(which)**(real(j - 1, wp)/(n - 1))*uniform(-1.0_wp, 1.0_wp)
+            end do
+         end do
+         before = matmul(x, transpose(x(:m, :)))
+         call rotator%orthogonalise(x, m, 0.0_wp, negligible, squares)
+         found = 0.0_wp
+         do j = 1, n
+            do i = 1, j - 1
+               gram = dot_product(x(:m, i), x(:m, j))
+               allowed = 2.0_wp*negligible*min(squares(i), squares(j)) + 8.0_wp*epsilon(1.0_wp)*sqrt(squares(i)*squares(j))
+               found = max(found, abs(gram)/allowed)
+            end do
+            call check_close(error, squares(j), dot_product(x(:m, j), x(:m, j)), 1.0e-10_wp*squares(j), 'squares')
+            if (allocated(error)) return
+         end do
+         call check(error, found <= 1.0_wp, 'columns are not orthogonal')
+         if (allocated(error)) return
+         call check_close(error, [matmul(x, transpose(x(:m, :)))], [before], 1.0e-12_wp*maxval(abs(before)), 'no rotation')
+         if (allocated(error)) return
+      end do
+   end subroutine test_columns
 
    !> z = (1 + h A D + h^2 A^2 K)^-1 r - r for three modes, by LAPACK from the equations of all nodes and modes at once. Where
    !> each damper is moved by one mode only, both ways of the program must agree, too.

@@ -1,10 +1,10 @@
 !> Jacobi's rotations, which make elements of a symmetric matrix zero, or columns of any matrix orthogonal, one by one (Golub &
-!> Van Loan, Matrix Computations, sec. 8.5 and 8.6.3).
+!> Van Loan, Matrix Computations, sec. 8.5).
 module rodyn_jacobi_rotation
    use rodyn_kinds, only: wp
    implicit none (type, external)
    private
-   public :: jacobi_rotation, rotate_columns, rotate_rows, orthogonalise_columns
+   public :: jacobi_rotation, rotate_columns, rotate_rows
 
 contains
 
@@ -49,61 +49,5 @@ contains
          x(j, k) = s*before + c*x(j, k)
       end do
    end subroutine rotate_rows
-
-   !> Rotate columns of x until the parts b_i in its first m rows are (nearly) orthogonal, all other rows along with them.
-   !>
-   !> Pairs are taken as in a tournament in which each column plays each other: no rotation of a round waits for another one. What
-   !> a sweep leaves is about the square of what it found, so that the last one need not be looked at (where squares are nearly
-   !> equal it may be more: up to the root of `negligible`).
-   pure subroutine orthogonalise_columns(x, m, smallest, negligible, squares)
-      real(wp), contiguous, intent(inout) :: x(:, :)
-      integer, intent(in) :: m
-      real(wp), intent(in) :: smallest     !! columns with a smaller square need no precision
-      real(wp), intent(in) :: negligible   !! b_i.b_j, of the smaller square
-      real(wp), intent(out) :: squares(:)  !! |b_i|^2, followed through the rotations (columns)
-      integer, parameter :: most_sweeps = 12
-      real(wp) :: product_ij, found, largest, c, s
-      integer :: sweep, round, pair, n, others, i, j
-
-      n = size(x, 2)
-      others = n - 1 + modulo(n, 2) ! an odd column has nobody to play with, once
-      do sweep = 1, most_sweeps
-         do i = 1, n
-            squares(i) = inner_product(m, x(:, i), x(:, i))
-         end do
-         largest = 0.0_wp
-         do round = 0, others - 1
-            do pair = 0, others/2
-               i = 1 + modulo(round + pair, others)
-               j = 1 + modulo(round - pair, others)
-               if (pair == 0) j = others + 1
-               if (j > n) cycle
-               product_ij = inner_product(m, x(:, i), x(:, j))
-               found = abs(product_ij)/max(smallest, min(squares(i), squares(j)), tiny(1.0_wp))
-               if (found <= negligible) cycle
-               largest = max(largest, found)
-               call jacobi_rotation(squares(i), squares(j), product_ij, c, s)
-               call rotate_columns(x, i, j, c, s)
-               squares(i) = squares(i) - s/c*product_ij
-               squares(j) = squares(j) + s/c*product_ij
-            end do
-         end do
-         if (largest**2 <= negligible) return
-      end do
-   end subroutine orthogonalise_columns
-
-   !> Sum of x_k y_k, in vectors.
-   pure real(wp) function inner_product(m, x, y)
-      integer, intent(in) :: m
-      real(wp), intent(in) :: x(m), y(m)
-      real(wp) :: total
-      integer :: k
-      total = 0.0_wp
-      !$omp simd reduction(+:total)
-      do k = 1, m
-         total = total + x(k)*y(k)
-      end do
-      inner_product = total
-   end function inner_product
 
 end module rodyn_jacobi_rotation

@@ -7,7 +7,7 @@ module rodyn_lapack
    implicit none (type, external)
    private
    public :: use_one_thread, symmetric_eigenvalues
-   public :: dpotrf, dpotrs, dpstrf, dgesv, dgetrf, dgetrs, dsyev, dgeev, dgemv, dtrsm
+   public :: dpotrf, dpotrs, dpstrf, dgesv, dgetrf, dgetrs, dsyev, dsyevd, dgeev, dgemv, dgemm, dtrsm
 
    interface
       !> Cholesky factors of a symmetric positive definite matrix.
@@ -111,6 +111,19 @@ module rodyn_lapack
          integer, intent(out) :: info
       end subroutine dsyev
 
+      !> The same by divide and conquer, faster for large matrices.
+      pure subroutine dsyevd(jobz, uplo, n, a, lda, w, work, lwork, iwork, liwork, info)
+         import :: wp
+         implicit none (type, external)
+         character(len=1), intent(in) :: jobz, uplo
+         integer, intent(in) :: n, lda, lwork, liwork
+         real(wp), intent(inout) :: a(lda, *)
+         real(wp), intent(out) :: w(*)
+         real(wp), intent(inout) :: work(*)
+         integer, intent(inout) :: iwork(*)
+         integer, intent(out) :: info
+      end subroutine dsyevd
+
       !> Eigenvalues, left and right vectors of a general matrix.
       pure subroutine dgeev(jobvl, jobvr, n, a, lda, wr, wi, vl, ldvl, vr, ldvr, work, lwork, info)
          import :: wp
@@ -133,6 +146,16 @@ module rodyn_lapack
          real(wp), intent(in) :: a(lda, *), x(*)
          real(wp), intent(inout) :: y(*)
       end subroutine dgemv
+
+      !> C = alpha op(A) op(B) + beta C.
+      pure subroutine dgemm(transa, transb, m, n, k, alpha, a, lda, b, ldb, beta, c, ldc)
+         import :: wp
+         implicit none (type, external)
+         character(len=1), intent(in) :: transa, transb
+         integer, intent(in) :: m, n, k, lda, ldb, ldc
+         real(wp), intent(in) :: alpha, a(lda, *), b(ldb, *), beta
+         real(wp), intent(inout) :: c(ldc, *)
+      end subroutine dgemm
    end interface
 
 contains

@@ -12,7 +12,7 @@ module rodyn_scene_modes
    use rodyn_scene, only: scene_type
    use rodyn_assembled, only: assembled_system, new_assembled_system, mass_matrix
    use rodyn_locks, only: has_slaves, reduce, expand, reduce_matrix
-   use rodyn_jacobi_rotation, only: orthogonalise_columns
+   use rodyn_orthogonal_columns, only: column_rotator
    use rodyn_lapack, only: dpotrf, dpstrf, dtrsm, dsyev, dgemv
    implicit none (type, external)
    private
@@ -35,6 +35,7 @@ module rodyn_scene_modes
       real(wp), allocatable :: columns(:, :) !! B, and below it L Q with Q of the last modes (2 n_dof, rank)
       real(wp), allocatable :: dampers(:, :) !! G, D = G G^T (n_dof, rank of D)
       real(wp), allocatable :: squares(:), work(:)
+      type(column_rotator) :: rotator
    contains
       procedure :: find
       procedure :: forget
@@ -167,8 +168,8 @@ contains
       call dtrsm('L', 'L', 'N', 'N', m, rank, 1.0_wp, self%system%m, m, self%columns, 2*m)
       ! It starts from what was orthogonal for an earlier configuration, so that few sweeps are enough; what little is left
       ! costs the integrator less than another sweep.
-      call orthogonalise_columns(self%columns, m, slowest**2, merge(damped_negligible, negligible, &
-                                 self%weight*self%relaxation > little), self%squares)
+      call self%rotator%orthogonalise(self%columns, m, slowest**2, merge(damped_negligible, negligible, &
+                                      self%weight*self%relaxation > little), self%squares)
       call dtrsm('L', 'L', 'T', 'N', m, rank, 1.0_wp, self%system%m, m, self%columns, 2*m)
       if (has_slaves(scene)) then
          self%work(:) = 0.0_wp
