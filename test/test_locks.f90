@@ -446,7 +446,7 @@ contains
       type(case_config) :: config
       type(motion_type) :: motion
       real(wp), allocatable :: y(:), a(:, :), still(:), moments(:, :)
-      real(wp) :: scale
+      real(wp) :: scale, rounding
       logical :: ok
       integer :: i, k, kernel
 
@@ -469,9 +469,10 @@ contains
          scale = maxval(abs(a(:, 2)))
          call check(error, maxval(abs(a(:, 1) - a(:, 2))) < 2.0e-11_wp*scale, kind_name(kinds(i))//': accelerations')
          if (allocated(error)) return
-         ! The assembled kernel has moments as what is left of M p' - forces, to the rounding of M p' (M to some 100 kg m^2).
-         scale = maxval(abs(moments)) + 0.1_wp*scale
-         call check(error, maxval(abs(moments(:, 1) - moments(:, 2))) < 1.0e-11_wp*scale, kind_name(kinds(i))//': moments')
+         ! The assembled kernel has moments as what is left of M p' - forces, to the rounding of n products with M of some 100 kg m^2.
+         rounding = n*epsilon(1.0_wp)*100.0_wp*scale
+         call check(error, maxval(abs(moments(:, 1) - moments(:, 2))) < 1.0e-11_wp*maxval(abs(moments)) + rounding, &
+                    kind_name(kinds(i))//': moments')
          if (allocated(error)) return
          deallocate (a, moments, still)
       end do
