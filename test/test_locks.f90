@@ -469,7 +469,7 @@ contains
          scale = maxval(abs(a(:, 2)))
          call check(error, maxval(abs(a(:, 1) - a(:, 2))) < 2.0e-11_wp*scale, kind_name(kinds(i))//': accelerations')
          if (allocated(error)) return
-         ! The assembled kernel has moments as what is left of M p' - forces, to the rounding of n products with M of some 100 kg m^2.
+         ! The assembled kernel has moments as what is left of M p' - forces: n products, rounded, with M of some 100 kg m^2.
          rounding = n*epsilon(1.0_wp)*100.0_wp*scale
          call check(error, maxval(abs(moments(:, 1) - moments(:, 2))) < 1.0e-11_wp*maxval(abs(moments)) + rounding, &
                     kind_name(kinds(i))//': moments')
