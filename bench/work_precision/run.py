@@ -347,8 +347,7 @@ class Benchmark:
             for c in done:
                 if time.monotonic() > end or c.best > 0.5 * self.budget or (round_number > 1 and c.best > 0.5):
                     continue
-                repeats = max(1, min(20, int(0.02 / c.best)))
-                answer = self.workers[c.line.worker].ask(c.job | {"repeats": repeats}, self.budget + START_UP)
+                answer = self.workers[c.line.worker].ask(c.job | {"repeats": repeats_of(c.best)}, self.budget + START_UP)
                 if answer["status"] == "done":
                     c.seconds.append(answer["seconds"])
         for c in done:
@@ -416,8 +415,8 @@ class Benchmark:
                     errors["heyoka batch", str(tol)] = np.abs(np.array(answer["alpha_rate"]) - truth).max()
             for name, job in variants:
                 answers = [rodyn.ask(base | job | {"hinge_factor": f, "repeats": 1}, 60.0) for f in factors]
-                if all(a["status"] == "done" for a in answers): # as much time to find a quiet moment as the batch has
-                    repeats = max(1, min(20, int(0.02 * len(factors) / sum(a["seconds"] for a in answers))))
+                if all(a["status"] == "done" for a in answers):  # as much time to find a quiet moment as the batch has
+                    repeats = repeats_of(sum(a["seconds"] for a in answers) / len(factors))
                     answers = [rodyn.ask(base | job | {"hinge_factor": f, "repeats": repeats}, 60.0) for f in factors]
                 if all(a["status"] == "done" for a in answers):
                     key = name, str(job.get("fixed_step", job.get("rtol")))
@@ -547,6 +546,11 @@ def time_at(errors: list[float], seconds: list[float], target: float) -> float:
     if known and wanted > max(e for e, _ in known):  # more exact than asked for, at the loosest setting
         best = min(best, min(s for _, s in known))
     return math.exp(best) if math.isfinite(best) else math.nan
+
+
+def repeats_of(seconds: float) -> int:
+    """How often a run of that length follows itself: 20 ms, in which a shared machine may have a quiet moment."""
+    return max(1, min(20, int(0.02 / seconds)))
 
 
 def geometric_mean(values: list[float]) -> float:
