@@ -16,7 +16,7 @@ import sys
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = ROOT / "build" / "second-compiler"
 INTRINSIC = {"iso_c_binding", "iso_fortran_env", "ieee_arithmetic", "ieee_exceptions"}
-FLAGS = ["-O2", "-cpp", "-DRODYN_STAMPED", f"-I{ROOT / 'src/rodyn/base'}", "-module-dir", str(BUILD)]
+FLAGS = ["-O2", "-module-dir", str(BUILD)]
 
 
 def modules() -> dict[str, tuple[pathlib.Path, set[str]]]:

@@ -93,7 +93,7 @@ contains
       call put('title', text_or_empty(origin%title))
       call put('status', 'running')
       call put('program_version', program_version)
-      call put('git_commit', git_commit)
+      call put('git_commit', git_commit())
       call put('compiler', compiler())
       call put('compiler_options', compiler_options())
       call put('sundials_version', text_or_empty(origin%sundials_version))

@@ -66,7 +66,7 @@ contains
       case ('defaults')
          call defaults_command(error)
       case ('--version')
-         call print_text('rodyn '//program_version//' ('//git_commit//')', error)
+         call print_text('rodyn '//program_version//' ('//git_commit()//')', error)
       case ('--help', '-h', 'help')
          call print_text(help_text(''), error)
       case ('')

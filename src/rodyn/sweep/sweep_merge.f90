@@ -180,7 +180,7 @@ contains
 
       call put('title', sweep%base_case%title)
       call put('program_version', program_version)
-      call put('git_commit', git_commit)
+      call put('git_commit', git_commit())
       call put('compiler', compiler())
       call put('compiler_options', compiler_options())
       call put('sundials_version', sundials_version())

@@ -190,7 +190,7 @@ contains
       integer :: a, i
 
       call buffer%line('format: 1')
-      call buffer%line('program: '//program_version//' ('//git_commit//')')
+      call buffer%line('program: '//program_version//' ('//git_commit()//')')
       call buffer%line('compiler: '//compiler()//', '//compiler_options())
       do i = 1, size(sweep%probe_times)
          call buffer%line('probe time: '//to_text(sweep%probe_times(i)))

@@ -1,22 +1,29 @@
 !> Which program this is: version, commit, compiler.
 !>
-!> `tools/stamp_commit` writes the commit into `git_commit.inc` (ignored by git), and `tools/build` compiles with
-!> -DRODYN_STAMPED, a flag that never changes, so that a new commit recompiles this file and not everything. A plain
-!> `fpm build` has no stamp: the commit is 'unknown'.
+!> The program says its commit first of all (`app/main.F90`), so that a new commit recompiles that file and nothing else. What
+!> was not stamped, a plain `fpm build` or another project that uses the library, is of commit 'unknown'.
 module rodyn_build_info
    use, intrinsic :: iso_fortran_env, only: fortran_compiler => compiler_version, fortran_options => compiler_options
    implicit none (type, external)
    private
-   public :: program_version, git_commit, compiler, compiler_options
+   public :: program_version, git_commit, set_git_commit, compiler, compiler_options
 
    character(len=*), parameter :: program_version = '0.1.0'
-#ifdef RODYN_STAMPED
-   include 'git_commit.inc'
-#else
-   character(len=*), parameter :: git_commit = 'unknown'
-#endif
+   character(len=64), save :: commit = 'unknown'
 
 contains
+
+   !> Commit of the program.
+   function git_commit() result(text)
+      character(len=:), allocatable :: text
+      text = trim(commit)
+   end function git_commit
+
+   !> Say which commit the program is of.
+   subroutine set_git_commit(text)
+      character(len=*), intent(in) :: text
+      commit = text
+   end subroutine set_git_commit
 
    !> Compiler and its version, as it calls itself.
    pure function compiler() result(text)

@@ -1,0 +1,34 @@
+"""Have files compiled again that use a module which was compiled after them.
+
+fpm compiles a file when its text changed, or in the same build as a module it uses. A build that ends in its midst leaves files that
+were compiled with older definitions, and which the next build would keep. Those lose their digest here, and so are compiled anew.
+"""
+
+from __future__ import annotations
+
+import pathlib
+import re
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+
+
+def main() -> None:
+    """Look at every build directory."""
+    module_of: dict[str, str] = {}
+    used_by: dict[str, set[str]] = {}
+    for folder in ("src", "app", "test", "bench"):
+        for path in sorted((ROOT / folder).rglob("*.[fF]90")):
+            text = path.read_text()
+            name = str(path.relative_to(ROOT)).replace("/", "_") + ".o"
+            used_by[name] = set(re.findall(r"^\s*use (rodyn\w*)", text, re.MULTILINE))
+            for module in re.findall(r"^\s*(?:sub)?module (?!procedure)(?:\(\w+\) )?(\w+)", text, re.MULTILINE):
+                module_of[module] = name
+    for folder in sorted((ROOT / "build").glob("*/rodyn")):
+        made = {path.name: path.stat().st_mtime_ns for path in folder.glob("*.o")}
+        for name, modules in used_by.items():
+            needed = max((made.get(module_of.get(module, ""), 0) for module in modules), default=0)
+            if name in made and needed > made[name]:
+                (folder / f"{name}.digest").unlink(missing_ok=True)
+
+
+main()
