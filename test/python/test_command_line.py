@@ -8,6 +8,7 @@ import pathlib
 import re
 import signal
 import subprocess
+import threading
 import time
 
 import h5py
@@ -275,6 +276,71 @@ def test_a_rod_that_bends_too_far_ends_with_a_warning(tmp_path):
 ])
 def test_masses_that_suffice_are_accepted(tmp_path, text):
     run_scene(tmp_path, text)
+
+
+# Input from standard input and from pipes
+
+
+@pytest.fixture
+def piped(tmp_path):
+    """Run the program with an input that can be read once: standard input as '-' or by its name, or a fifo."""
+
+    def run(kind: str, text: str, command: str, *options: str) -> subprocess.CompletedProcess[str]:
+        if kind != "pipe":
+            return rodyn(command, kind, *options, cwd=tmp_path, input=text)
+        os.mkfifo(tmp_path / "pipe")
+        writer = threading.Thread(target=lambda: (tmp_path / "pipe").write_text(text), daemon=True)
+        writer.start()
+        result = rodyn(command, "pipe", *options, cwd=tmp_path)
+        writer.join(timeout=5)
+        (tmp_path / "pipe").unlink()
+        return result
+
+    return run
+
+
+@pytest.mark.parametrize("kind", ["-", "/dev/stdin", "pipe"])
+def test_any_input_that_can_be_read_is_read(piped, tmp_path, kind):
+    long = "".join(f"! a comment that no buffer of a pipe holds whole, line {i}\n" for i in range(5000))
+    text = long + SCENES["one rod"]
+    name = "standard input" if kind == "-" else kind
+    assert (lambda r: (r.returncode, r.stdout))(piped(kind, text, "check")) == (0, f"{name}: valid\n")
+    bad = piped(kind, long + "&case t_end = -1 /\n", "check")
+    assert bad.returncode == 2 and f"{name}:5001: &case t_end = -1: must be positive [s]\n" in bad.stderr
+    for command in ("run", "modes"):
+        assert piped(kind, text, command, "--output", f"{command}.h5").returncode == 0
+        with h5py.File(tmp_path / f"{command}.h5") as file:
+            assert file.attrs["input"].decode() == text
+    (tmp_path / "base.nml").write_text(SCENES["one rod"])
+    sweep = "&sweep base = 'base.nml' /\n&axis key = 'load.value', values = 1, 2 /\n"
+    assert piped(kind, sweep, "sweep", "--output", "sweep").returncode == 0
+    assert (tmp_path / "sweep" / "sweep.h5").exists()
+    (tmp_path / "s.nml").write_text(sweep.replace("base.nml", "pipe" if kind == "pipe" else "/dev/stdin"))
+    if kind != "pipe":
+        assert rodyn("check", "s.nml", cwd=tmp_path, input=SCENES["one rod"]).returncode == 0
+
+
+@pytest.mark.parametrize("kind", ["-", "/dev/stdin", "pipe"])
+@pytest.mark.parametrize("command", ["run", "modes", "sweep"])
+def test_an_input_without_a_name_gives_the_result_none(piped, tmp_path, kind, command):
+    result = piped(kind, SCENES["one rod"], command)
+    assert result.returncode == 2 and f"rodyn {command}: the input is a stream without a name" in result.stderr
+    assert "--output" in result.stderr
+    assert files(tmp_path) == []
+
+
+def test_a_case_from_standard_input_may_name_its_result(piped, tmp_path):
+    assert piped("-", SCENES["one rod"] + "&output file = 'mine.h5' /\n", "run").returncode == 0
+    assert files(tmp_path) == ["mine.h5"]
+
+
+def test_an_endless_or_binary_stream_is_refused(tmp_path):
+    result = rodyn("check", "/dev/zero", cwd=tmp_path)
+    assert result.returncode == 2 and result.stderr == "/dev/zero: cannot be read (more than 256 MB)\n"
+    path = run_scene(tmp_path, SCENES["one rod"])
+    result = subprocess.run([RODYN, "check", "-"], stdin=path.open("rb"), capture_output=True, text=True)
+    assert result.returncode == 2
+    assert result.stderr == "standard input: an HDF5 file cannot be read from a pipe; give its name\n"
 
 
 # Names of results

@@ -7,6 +7,7 @@ module rodyn_posix
    implicit none (type, external)
    private
    public :: posix_close, posix_closedir, posix_fsync, posix_open, posix_opendir, posix_signal ! for `rodyn_posix_files`
+   public :: read_all
    public :: process_id, host_name, utc_now
    public :: path_exists, same_path, is_directory, is_special, is_writable, parent_directory
    public :: sync_path, rename_over, rename_new, remove_file
@@ -15,7 +16,7 @@ module rodyn_posix
 
    integer(c_int), parameter :: f_ok = 0, w_ok = 2, x_ok = 1               ! <unistd.h>
    integer(c_int), parameter :: o_rdonly = 0                               ! <fcntl.h>
-   integer(c_int), parameter :: eperm = 1, eexist = 17, emlink = 31, enosys = 38, enotsup = 95 ! <errno.h>, Linux
+   integer(c_int), parameter :: eperm = 1, enomem = 12, eexist = 17, emlink = 31, enosys = 38, enotsup = 95 ! <errno.h>, Linux
    integer(c_int), parameter :: sigxfsz = 25                               ! <signal.h>, Linux
    integer(c_intptr_t), parameter :: sig_ign = 1_c_intptr_t                ! <signal.h>
 
@@ -43,6 +44,15 @@ module rodyn_posix
          integer(c_size_t), intent(in), value :: count
          integer(c_intptr_t) :: written
       end function posix_write
+
+      function posix_read(descriptor, bytes, count) result(n) bind(c, name='read')
+         import :: c_char, c_int, c_intptr_t, c_size_t
+         implicit none (type, external)
+         integer(c_int), intent(in), value :: descriptor
+         character(kind=c_char), intent(inout) :: bytes(*)
+         integer(c_size_t), intent(in), value :: count
+         integer(c_intptr_t) :: n
+      end function posix_read
 
       function posix_open(path, flags) result(descriptor) bind(c, name='open')
          import :: c_char, c_int
@@ -387,6 +397,79 @@ contains
          end if
       end do
    end function write_output
+
+   !> Everything that can be read behind a path, whatever its kind: a file, a pipe, a device; its size is not asked for.
+   subroutine read_all(path, most, text, failure)
+      character(len=*), intent(in) :: path !! empty: standard input
+      integer, intent(in) :: most          !! bytes; what is longer is a failure
+      character(len=:), allocatable, intent(out) :: text
+      character(len=:), allocatable, intent(out) :: failure !! empty on success
+      integer(c_int), parameter :: standard_input = 0
+      integer(c_int) :: descriptor, status
+
+      descriptor = standard_input
+      if (len(path) > 0) descriptor = posix_open(path//c_null_char, o_rdonly)
+      if (descriptor < 0) then
+         failure = last_failure()
+         return
+      end if
+      call read_until_end(descriptor, most, text, failure)
+      if (len(path) > 0) status = posix_close(descriptor)
+   end subroutine read_all
+
+   subroutine read_until_end(descriptor, most, text, failure)
+      integer(c_int), intent(in) :: descriptor
+      integer, intent(in) :: most
+      character(len=:), allocatable, intent(out) :: text
+      character(len=:), allocatable, intent(out) :: failure
+      integer(c_int), parameter :: eintr = 4
+      character(len=:), allocatable :: buffer
+      integer(c_intptr_t) :: n
+      integer :: length
+
+      failure = ''
+      length = 0
+      call resize(buffer, 0, min(most, 65536) + 1, failure)
+      do while (len(failure) == 0)
+         if (length == len(buffer)) call resize(buffer, length, min(most, 2*length) + 1, failure)
+         if (len(failure) > 0) exit
+         n = posix_read(descriptor, buffer(length + 1:), int(len(buffer) - length, c_size_t))
+         if (n == 0) exit
+         if (n > 0) then
+            length = length + int(n)
+            if (length > most) failure = 'more than '//megabytes(most)//' MB'
+         else if (errno() /= eintr) then
+            failure = last_failure()
+         end if
+      end do
+      if (len(failure) == 0) text = buffer(:length)
+   end subroutine read_until_end
+
+   !> Room for a text that grows.
+   subroutine resize(buffer, length, size, failure)
+      character(len=:), allocatable, intent(inout) :: buffer
+      integer, intent(in) :: length !! characters to keep
+      integer, intent(in) :: size
+      character(len=:), allocatable, intent(inout) :: failure
+      character(len=:), allocatable :: larger
+      integer :: stat
+
+      allocate (character(len=size) :: larger, stat=stat)
+      if (stat /= 0) then
+         failure = error_text(enomem)
+         return
+      end if
+      if (length > 0) larger(:length) = buffer(:length)
+      call move_alloc(larger, buffer)
+   end subroutine resize
+
+   pure function megabytes(bytes) result(text)
+      integer, intent(in) :: bytes
+      character(len=:), allocatable :: text
+      character(len=12) :: digits
+      write (digits, '(i0)') bytes/1024**2
+      text = trim(digits)
+   end function megabytes
 
    !> Why the last call failed.
    function last_failure() result(text)

@@ -4,7 +4,7 @@ module rodyn_command_line
    use rodyn_errors, only: error_type, raise, exit_done, exit_bad_input
    use rodyn_case_config, only: case_config
    use rodyn_case_reader, only: default_case, parse_case
-   use rodyn_input_texts, only: input_texts, is_result_file, read_input_texts
+   use rodyn_input_texts, only: input_texts, is_result_file, is_stream, read_input_texts
    use rodyn_modal_analysis, only: analyse_modes
    use rodyn_posix_files, only: watch_signals
    use rodyn_run, only: check_steps, run_case
@@ -100,10 +100,10 @@ contains
       call read_one_case(options%file, 'rodyn sweep computes it', input, config, error)
       if (allocated(error)) return
       path = output_path(options, config, input%from_result)
-      call refuse_input(path, options%file, error)
+      call refuse_input(path, options, error)
       if (allocated(error)) return
       call watch_signals()
-      call run_case(config, path, error, input_text=input%text, force=options%force, quiet=options%quiet, name=options%file)
+      call run_case(config, path, error, input_text=input%text, force=options%force, quiet=options%quiet, name=input%name)
    end subroutine run_file_command
 
    !> The case of a file, which must not be a sweep.
@@ -123,13 +123,24 @@ contains
       end if
    end subroutine read_one_case
 
-   !> The result must not take the place of the case.
-   subroutine refuse_input(path, input, error)
-      character(len=*), intent(in) :: path, input
+   !> The result must have a name, and must not take the place of the case.
+   subroutine refuse_input(path, options, error)
+      character(len=*), intent(in) :: path
+      type(options_type), intent(in) :: options
       type(error_type), allocatable, intent(out) :: error
-      if (same_path(path, input)) &
+      if (len(path) == 0 .and. .not. allocated(options%output)) then
+         call raise(error, name_wanted('FILE.h5'), exit_bad_input)
+      else if (options%file /= '-' .and. same_path(path, options%file)) then
          call raise(error, path//': is the case itself; give the result another name by --output', exit_bad_input)
+      end if
    end subroutine refuse_input
+
+   !> What is told where the input is a stream, and so gives the result no name.
+   function name_wanted(kind) result(text)
+      character(len=*), intent(in) :: kind !! of name
+      character(len=:), allocatable :: text
+      text = 'rodyn '//argument(1)//': the input is a stream without a name of its own; name the result by --output '//kind
+   end function name_wanted
 
    !> rodyn modes
    subroutine modes_command(options, error)
@@ -141,9 +152,8 @@ contains
 
       call read_one_case(options%file, 'modes are those of one case', input, config, error)
       if (allocated(error)) return
-      path = base_name(options%file)//'_modes.h5'
-      if (allocated(options%output)) path = options%output
-      call refuse_input(path, options%file, error)
+      path = result_name(options, '_modes.h5')
+      call refuse_input(path, options, error)
       if (.not. allocated(error)) call analyse_modes(config, path, options%equilibrium, options%loads, error, &
                                                      input_text=input%text, &
                                                      force=options%force, quiet=options%quiet)
@@ -157,18 +167,22 @@ contains
       type(sweep_config) :: sweep
       type(scene_type) :: scene
       type(input_texts) :: input
+      character(len=:), allocatable :: name
 
       call read_input_texts(options%file, input, error)
       if (allocated(error)) return
+      name = input%name
+      if (input%from_result) name = options%file
       if (input%is_sweep) then
          call parse_sweep(input%text, input%name, input%base_text, input%base_name, .true., sweep, error)
          if (.not. allocated(error)) call new_scene(scene, sweep%base_case, error)
       else ! numbers may be finite, and what follows from them not
          call parse_case(input%text, input%name, config, error)
          if (.not. allocated(error)) call new_scene(scene, config, error)
-         if (.not. allocated(error)) call check_steps(config, scene, options%file, error)
+         if (.not. allocated(error)) call check_steps(config, scene, input%name, error)
       end if
-      if (.not. allocated(error) .and. .not. options%quiet) call print_text(options%file//': valid', error)
+      if (.not. allocated(error) .and. .not. options%quiet) &
+         call print_text(name//': valid', error)
    end subroutine check_command
 
    !> rodyn sweep
@@ -180,9 +194,11 @@ contains
 
       exit_code = exit_bad_input
       sweep%file = options%file
-      sweep%output = base_name(options%file)
-      if (is_result_file(options%file)) sweep%output = sweep%output//'-again'
-      if (allocated(options%output)) sweep%output = options%output
+      sweep%output = result_name(options, trim(merge('-again', '      ', is_result_file(options%file))))
+      if (len(sweep%output) == 0 .and. .not. allocated(options%output)) then
+         call raise(error, name_wanted('DIR'), exit_bad_input)
+         return
+      end if
       sweep%dry_run = options%dry_run
       sweep%retry_failed = options%retry_failed
       sweep%force = options%force
@@ -254,16 +270,24 @@ contains
       logical, intent(in) :: again !! the case is that of a result
       character(len=:), allocatable :: path
 
-      if (allocated(options%output)) then
-         path = options%output
-         return
-      end if
-      if (allocated(config%output%file) .and. .not. again) then
-         path = config%output%file
-         if (len(path) > 0) return
-      end if
-      path = base_name(options%file)//trim(merge('-again.h5', '.h5      ', again))
+      path = result_name(options, trim(merge('-again.h5', '.h5      ', again)))
+      if (allocated(options%output) .or. again .or. .not. allocated(config%output%file)) return
+      if (len(config%output%file) > 0) path = config%output%file
    end function output_path
+
+   !> The name that --output gives, or else that of the input with an ending; empty if that has none.
+   function result_name(options, ending) result(name)
+      type(options_type), intent(in) :: options
+      character(len=*), intent(in) :: ending
+      character(len=:), allocatable :: name
+      if (allocated(options%output)) then
+         name = options%output
+      else if (is_stream(options%file)) then
+         name = ''
+      else
+         name = base_name(options%file)//ending
+      end if
+   end function result_name
 
    !> Arguments behind the command.
    subroutine read_options(options, error)
@@ -343,6 +367,7 @@ contains
          text = 'rodyn run CASE.nml [--output FILE.h5] [--force] [--quiet]'//nl// &
                 '  Integrate one scene and write its HDF5 file (default: CASE.h5 in the working directory).'//nl// &
                 '  The case may be a result of an earlier run: its stored input is run again (default: CASE-again.h5).'//nl// &
+                '  - reads it from standard input; that, or a pipe, gives the result no name: use --output.'//nl// &
                 '  --output FILE.h5   name of the result'//nl// &
                 '  --force            replace an existing result'//nl// &
                 '  --quiet            print nothing but errors'//nl// &
@@ -352,7 +377,7 @@ contains
          text = 'rodyn modes CASE.nml [--equilibrium | --loads] [--output FILE.h5] [--force] [--quiet]'//nl// &
                 '  Linearise the scene in full at its initial state, without its loads. Natural frequencies,'//nl// &
                 '  damping ratios, mode shapes and matrices go to one HDF5 file (default: CASE_modes.h5 in the working'//nl// &
-                '  directory), a table to the terminal.'//nl// &
+                '  directory), a table to the terminal. - reads the case from standard input.'//nl// &
                 '  --equilibrium      at the equilibrium near the initial state instead, under the loads that act at'//nl// &
                 '                     t = 0 (they must be constant), at rest on a spacecraft with the initial spin'//nl// &
                 '  --loads            at the initial state, under the loads that act at t = 0'//nl// &
@@ -365,6 +390,7 @@ contains
                 '  Compute many variants of a case; the result is DIR/sweep.h5 (default: SWEEP in the working directory).'//nl// &
                 '  Run the same command again to resume; under mpirun or srun the ranks share the cases.'//nl// &
                 '  A sweep.h5 in place of SWEEP.nml is computed anew from its stored input (default: sweep-again).'//nl// &
+                '  - reads the sweep from standard input; its base is then found from the working directory.'//nl// &
                 '  --output DIR       directory of results; made if it does not exist'//nl// &
                 '  --shard I/N        every N-th case, beginning with the I-th; the last shard to end merges all'//nl// &
                 '  --dry-run          print the table of cases, and an estimate of time and disk'//nl// &
@@ -376,6 +402,7 @@ contains
       case ('check')
          text = 'rodyn check FILE.nml [--quiet]'//nl// &
                 '  Validate only: print every fault of the file at once; of a result, those of its stored input.'//nl// &
+                '  - reads standard input.'//nl// &
                 '  Exit code 0 or 2.'
       case ('defaults')
          text = 'rodyn defaults [run|sweep]'//nl// &

@@ -2,13 +2,13 @@
 !> be made again from its result alone.
 module rodyn_input_texts
    use rodyn_errors, only: error_type, raise, exit_bad_input
-   use rodyn_file_text, only: read_text_file
+   use rodyn_file_text, only: read_standard_input, read_text_file, standard_input
    use rodyn_hdf5_files, only: hdf5_file
-   use rodyn_kinds, only: i8
+   use rodyn_posix, only: is_special, parent_directory
    use rodyn_sweep_reader, only: find_base, is_sweep_text
    implicit none (type, external)
    private
-   public :: input_texts, is_result_file, read_input_texts
+   public :: input_texts, is_result_file, is_stream, read_input_texts
 
    character(len=8), parameter :: signature = achar(137)//'HDF'//achar(13)//achar(10)//achar(26)//achar(10) !! of HDF5
 
@@ -21,11 +21,12 @@ module rodyn_input_texts
 
 contains
 
-   !> Read what is behind a path, unchecked. Whatever is wrong with the files is bad input: exit code 2.
+   !> Read what is behind a path, unchecked; '-' is standard input. Whatever is wrong with the files is bad input: exit code 2.
    subroutine read_input_texts(path, input, error)
       character(len=*), intent(in) :: path
       type(input_texts), intent(out) :: input
       type(error_type), allocatable, intent(out) :: error
+      character(len=:), allocatable :: directory
 
       input%from_result = is_result_file(path)
       if (input%from_result) then
@@ -34,24 +35,39 @@ contains
          return
       end if
       input%name = path
-      call read_text_file(path, input%text, error)
+      if (path == '-') then
+         input%name = standard_input
+         call read_standard_input(input%text, error)
+      else
+         call read_text_file(path, input%text, error)
+      end if
       if (allocated(error)) return
+      if (index(input%text, signature) == 1) then
+         call raise(error, input%name//': an HDF5 file cannot be read from a pipe; give its name', exit_bad_input)
+         return
+      end if
       input%is_sweep = is_sweep_text(input%text)
       if (.not. input%is_sweep) return
-      call find_base(input%text, path, input%base_name, error)
+      directory = '.'
+      if (.not. is_stream(path)) directory = parent_directory(path)
+      call find_base(input%text, input%name, directory, input%base_name, error)
       if (.not. allocated(error)) call read_text_file(input%base_name, input%base_text, error)
    end subroutine read_input_texts
+
+   !> Is the input a stream: standard input, a pipe, a device? It has no name that its result could have, too.
+   logical function is_stream(path)
+      character(len=*), intent(in) :: path
+      is_stream = path == '-' .or. path == '/dev/stdin' .or. index(path, '/dev/fd/') == 1 .or. is_special(path)
+   end function is_stream
 
    !> Does the file begin as HDF5 files do? No, if it cannot be read.
    logical function is_result_file(path)
       character(len=*), intent(in) :: path
       character(len=len(signature)) :: beginning
-      integer(i8) :: bytes
       integer :: stat, unit
 
       is_result_file = .false.
-      inquire (file=path, size=bytes, iostat=stat) ! a pipe, which must not be read twice, has none
-      if (stat /= 0 .or. bytes < len(signature)) return
+      if (path == '-' .or. is_special(path)) return ! a pipe must not be read twice
       open (newunit=unit, file=path, access='stream', form='unformatted', status='old', action='read', iostat=stat)
       if (stat /= 0) return
       read (unit, iostat=stat) beginning

@@ -21,7 +21,7 @@ module rodyn_sweep_engine
    use rodyn_sweep_plan, only: sweep_plan, new_plan, plan_text
    use rodyn_sweep_progress, only: sweep_counts, sweep_progress
    use rodyn_sweep_ranks, only: rank_group, at_done, at_errors, at_failed, at_next, at_stopped
-   use rodyn_sweep_reader, only: find_base, parse_sweep
+   use rodyn_sweep_reader, only: parse_sweep
    use rodyn_sweep_result, only: result_is_sound, write_result
    use rodyn_sweep_worker, only: case_feed, lanes_text, run_cases, uses_lanes
    use rodyn_sweep_writer, only: shard_writer
@@ -161,8 +161,8 @@ contains
 
       if (engine%ranks%rank == 0) then
          call read_input_texts(engine%options%file, input, error)
-         if (.not. allocated(error) .and. .not. input%is_sweep) & ! says what is missing
-            call find_base(input%text, input%name, input%base_name, error)
+         if (.not. allocated(error) .and. .not. input%is_sweep) call raise(error, input%name// &
+            ': has neither &sweep nor &axis, so it is no sweep; rodyn run computes a case', exit_bad_input)
          if (.not. allocated(error)) call parse(.true.)
          if (engine%ranks%launched > 1 .and. engine%ranks%count == 1 .and. .not. allocated(error)) &
             call raise(error, to_text(engine%ranks%launched)//' processes were started, but MPI connects none of them; '// &

@@ -16,7 +16,6 @@ module rodyn_sweep_reader
    use rodyn_namelist_document, only: namelist_document, group_count
    use rodyn_namelist_edit, only: split_key
    use rodyn_namelist_parser, only: parse_document
-   use rodyn_posix, only: parent_directory
    use rodyn_schema, only: any_list, group_index, nearest_key, nearest_group, row_index, type_integer, type_logical, type_real
    use rodyn_sweep_case, only: build_values
    use rodyn_sweep_config, only: sweep_axis, sweep_config, axis_size, is_ratio, value_text
@@ -34,8 +33,9 @@ module rodyn_sweep_reader
 contains
 
    !> Where the base of a sweep is: its path, from the directory of the sweep file.
-   subroutine find_base(text, name, path, error)
+   subroutine find_base(text, name, directory, path, error)
       character(len=*), intent(in) :: text, name
+      character(len=*), intent(in) :: directory
       character(len=:), allocatable, intent(out) :: path
       type(error_type), allocatable, intent(out) :: error
       type(namelist_document), target :: document
@@ -51,8 +51,8 @@ contains
       call loader%text_field('base', path)
       if (entry_of(checked, 'sweep', 1, 'base') == 0) then
          call checked%faults%to_error(name, error)
-      else if (index(path, '/') /= 1 .and. index(name, '/') > 0) then
-         path = parent_directory(name)//'/'//path
+      else if (index(path, '/') /= 1 .and. directory /= '.') then
+         path = directory//'/'//path
       end if
    end subroutine find_base
 
