@@ -20,7 +20,7 @@ module test_lanes
 
    !> Eight scenes with a state each.
    type :: octet
-      type(motion_type) :: motions(lanes)
+      type(motion_type), allocatable :: motions(:) !! (lanes)
       type(lane_scene) :: group
       type(lane_work) :: work
       real(wp), allocatable :: q(:, :), p(:, :), acceleration(:, :) !! (lanes, n_dof)
@@ -79,6 +79,7 @@ contains
       real(wp), allocatable :: y(:), ydot(:)
       logical :: ok
 
+      if (.not. allocated(eight%motions)) allocate (eight%motions(lanes))
       call new_motion(eight%motions(lane), scene, .false., error)
       if (allocated(error)) return
       if (lane == 1) then
