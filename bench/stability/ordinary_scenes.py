@@ -17,7 +17,7 @@ import pathlib
 import random
 from collections.abc import Sequence
 
-RADIANS = 3e4
+RADIANS = 3e3
 Value = float | int | bool | str | list
 Group = tuple[str, dict[str, Value]]
 
@@ -159,9 +159,9 @@ class Scene:
             return math.sqrt(4.0 * min(c, 3.0 * soft / length) / inertia) + 2.0 * min(d, soft / length * 0.1) / inertia
         return max(math.sqrt(4.0 * c / inertia), 2.0 * d / inertia)
 
-    def duration(self, longest: float = 100.0) -> float:
-        """A time as it is typed, such that the fastest motion has no more than `RADIANS` radians, often far fewer."""
-        most = min(RADIANS * 0.05 ** self.typist.draw() / self.fastest(), longest)
+    def duration(self, longest: float = 100.0, times: float = 1.0) -> float:
+        """A time as it is typed, such that the fastest motion has no more than `RADIANS` radians (`times` as many), often fewer."""
+        most = min(times * RADIANS * 0.1 ** self.typist.draw() / self.fastest(), longest)
         typed = [x * 10.0**k for k in range(-3, 3) for x in (1.0, 2.0, 3.0, 4.0, 5.0, 8.0)]
         return float(f"{max([x for x in typed if x <= most], default=typed[0]):.3g}")
 
@@ -256,7 +256,7 @@ def damped_slews(t: Typist) -> list[Group]:
     scene = some_model(t, t.whole(1, 6), 0.8)
     scene.add_spacecraft(fixed=0.0)
     scene.add_chain(stiffness=(50, 3000), damping=(0.5, 50))
-    t_end = scene.duration()
+    t_end = scene.duration(times=4.0)
     add_pulses(scene, t_end)
     return scene.groups(t_end)
 
