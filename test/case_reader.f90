@@ -205,7 +205,7 @@ contains
       type(case_config) :: config
       call expect_accepted(error, valid//"&case title = 'it''s ""one""', t_end = 0.1, n_outputs = 7 /"//nl// &
          '&initial phi = 0.1, 0.1, 0.3333333333333333333, -0.0, phi_rate = 4*1e-7, omega = 1.1 /'//nl// &
-         "&load law = 'table', times = 0 0.1 0.7, values = 3*0.2, component = 'X' /"//nl// &
+         "&load law = 'table', times = 0 0.1 0.7, values = 3*0.2, after = 'hold', component = 'X' /"//nl// &
          "&load law = 'sine_squared', value = -1500, rate = 0.3, t_start = 0.05 /"//nl// &
          "&load law = 'smooth_step', value = 1.1, target = 'node', node = 2, component = 'Y' /"//nl// &
          "&solver method = 'erk', fixed_step = 1.1e-3, order = 5 /"//nl// &

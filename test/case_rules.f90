@@ -200,10 +200,12 @@ contains
       type(error_type), allocatable, intent(out) :: error
       call expect_faults(error, &
          valid//'&load value = 1, rate = 2 /'//nl//&
-         '&load law = ''table'', times = 0, 1, values = 1, 2, value = 3, rise_time = 1 /', &
+         '&load law = ''table'', times = 0, 1, values = 1, 2, value = 3, rise_time = 1 /'//nl//&
+         '&load value = 1, after = ''hold'' /', &
          'c.nml:3: &load rate = 2: does not go with law = ''constant'''//nl//&
          'c.nml:4: &load value = 3: does not go with law = ''table'''//nl//&
-         'c.nml:4: &load rise_time = 1: does not go with law = ''table''')
+         'c.nml:4: &load rise_time = 1: does not go with law = ''table'''//nl//&
+         'c.nml:5: &load after = ''hold'': does not go with law = ''constant''')
    end subroutine law_forbidden
 
    subroutine table_count(error)

@@ -30,6 +30,7 @@ program tester
    use test_schema, only: collect_schema
    use test_step_limit, only: collect_step_limit
    use test_sweep, only: collect_sweep
+   use test_switches, only: collect_switches
    use test_validity, only: collect_validity
    implicit none (type, external)
 
@@ -56,6 +57,7 @@ program tester
    call run('modes', collect_modes)
    call run('held_modes', collect_held_modes)
    call run('moving', collect_moving)
+   call run('switches', collect_switches)
    call run('newton', collect_newton)
    call run('integrators', collect_integrators)
    call run('gauss', collect_gauss)

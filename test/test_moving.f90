@@ -3,7 +3,6 @@ module test_moving
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
    use rodyn_case_config, only: case_config, hinge_config, kink_config, load_config
-   use rodyn_loads, only: load_value
    use rodyn_kink_program, only: kink_set, kink_regime, new_kink_set, new_kink_regime, evaluate_kinks
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_text, only: to_text
@@ -123,7 +122,7 @@ contains
       real(wp) :: edges(8)
       integer :: i
 
-      call new_kink_set(set, spread(0.0_wp, 1, 4), four_programs(), 1.0_wp)
+      call new_kink_set(set, spread(0.0_wp, 1, 4), four_programs())
       edges = [0.0_wp, 0.05_wp, 0.1_wp, 0.2_wp, 0.5_wp, 0.6_wp, 0.9_wp, 0.95_wp]
       do i = 1, 7
          call new_kink_regime(regime, set, edges(i), edges(i + 1))
@@ -162,7 +161,7 @@ contains
       program%law = 'table'
       program%times = [0.0_wp, 0.15_wp, 0.5_wp, 0.7_wp, 1.0_wp]
       program%values = 3.0_wp*program%times**2 - 2.0_wp*program%times**3
-      call new_kink_set(set, [0.0_wp], [program], 2.0_wp)
+      call new_kink_set(set, [0.0_wp], [program])
       do i = 1, 20
          t = real(i, wp)/21.0_wp
          call new_kink_regime(regime, set, t - 1.0e-3_wp, t + 1.0e-3_wp)
@@ -1081,12 +1080,20 @@ contains
       do i = 1, size(self%loads)
          component = index('XYM', self%loads(i)%component(1:1))
          if (self%loads(i)%target == 'node') then
-            node(component, self%loads(i)%node) = node(component, self%loads(i)%node) + load_value(self%loads(i), t)
+            node(component, self%loads(i)%node) = node(component, self%loads(i)%node) + value_at(self%loads(i), t)
          else
-            base(component) = base(component) + load_value(self%loads(i), t)
+            base(component) = base(component) + value_at(self%loads(i), t)
          end if
       end do
    end subroutine add_written
+
+   !> The laws of random cases.
+   pure real(wp) function value_at(load, t)
+      type(load_config), intent(in) :: load
+      real(wp), intent(in) :: t
+      value_at = load%value
+      if (load%law == 'sine_squared') value_at = load%value*sin(load%rate*t)**2
+   end function value_at
 
    subroutine test_written_loads(error)
       type(error_type), allocatable, intent(out) :: error

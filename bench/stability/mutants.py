@@ -25,7 +25,7 @@ CASES = [
     TIMES + "&spacecraft motion = 'fixed', hinge_x = 0.35 /\n" + CHAIN.replace(" /\n", ", kink = 0, 0.05, 0 /\n")
     + "&model bending = 'rigid', gauss_points = 3 /\n&initial phi = 0.1, -0.2, 3*0.1 /\n".replace("3*", "")
     + "&solver method = 'erk', order = 6, fixed_step = 2e-4 /\n",
-    TIMES + SPACECRAFT + CHAIN + "&load law = 'table', component = 'X', times = 0, 0.01, 0.03, values = 0, 400, 100 /\n"
+    TIMES + SPACECRAFT + CHAIN + "&load law = 'table', component = 'X', times = 0, 0.01, 0.03, values = 0, 400, 100, after = 'hold' /\n"
     + "&load law = 'smooth_step', component = 'Y', t_start = 0.01, rise_time = 0.02, value = 300 /\n"
     + "&solver method = 'dop853', rtol = 1e-9, max_steps = 5000 /\n&output ledger = .false., compression = 0 /\n",
     TIMES + SPACECRAFT + CHAIN + "&model inertia = 'lumped', bending = 'rigid' /\n&initial phi_rate = 1, velocity_x = 2, omega = -3,"

@@ -7,7 +7,7 @@ CHAIN = """&chain n_rods = 3, length = 1.5, 1.4, 1.3, mass_per_length = 1.7, ben
 """
 MOMENT = "&load component = 'M', value = 1500, t_end = 0.02 /\n"
 LOADS = MOMENT + """&load target = 'node', node = 2, component = 'Y', law = 'sine_squared', value = 50, rate = 40 /
-&load law = 'table', component = 'X', times = 0, 0.01, 0.03, values = 0, 400, 100 /
+&load law = 'table', component = 'X', times = 0, 0.01, 0.03, values = 0, 400, 100, after = 'hold' /
 &load law = 'smooth_step', component = 'Y', t_start = 0.01, rise_time = 0.02, value = 300 /
 """
 MODELS = {

@@ -41,7 +41,7 @@ contains
       motion%turning = scene%n_base > 0
       call new_lane_scene(motion%group, scene, one_rod_each=.true.)
       call new_lane_work(motion%work, motion%group)
-      motion%group%loaded = any(scene%loads%loads%target == 'node')
+      motion%group%loaded = any(scene%loads%loads%node > 0)
    end subroutine new_lane_motion
 
    !> Put a scene into a lane. Loads act after `set_regime`.

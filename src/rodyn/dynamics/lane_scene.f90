@@ -57,7 +57,7 @@ contains
       type(scene_type), intent(in) :: a, b
       are_alike = a%n == b%n .and. a%n_base == b%n_base .and. (a%dynamic_bending .eqv. b%dynamic_bending) .and. &
                   (a%quasistatic .eqv. b%quasistatic) .and. (has_series_dampers(a) .eqv. has_series_dampers(b)) .and. &
-                  (any(a%loads%loads%target == 'node') .eqv. any(b%loads%loads%target == 'node'))
+                  (any(a%loads%loads%node > 0) .eqv. any(b%loads%loads%node > 0))
    end function are_alike
 
    pure logical function has_series_dampers(scene)

@@ -13,6 +13,7 @@ module rodyn_motion
    use rodyn_trigonometry, only: sine_cosine
    use rodyn_case_config, only: initial_config
    use rodyn_scene, only: scene_type
+   use rodyn_switch_times, only: add_switches
    use rodyn_user_load, only: user_load
    use rodyn_hinge_events, only: event_set, new_event_set
    use rodyn_accelerations, only: dynamics_type, new_dynamics
@@ -340,20 +341,10 @@ contains
    subroutine set_user_load(self, load)
       class(motion_type), intent(inout) :: self
       class(user_load), target, intent(inout) :: load !! must outlive the run
-      real(wp), allocatable :: times(:)
-      real(wp) :: next
 
       self%dynamics%user => load
       if (.not. allocated(load%switches)) return
-      associate (scene => self%dynamics%scene)
-         times = [scene%switches, pack(load%switches, load%switches > 0.0_wp)]
-         scene%switches = [real(wp) ::]
-         do while (size(times) > 0)
-            next = minval(times)
-            scene%switches = [scene%switches, next]
-            times = pack(times, times > next)
-         end do
-      end associate
+      call add_switches(self%dynamics%scene%switches, pack(load%switches, load%switches > 0.0_wp))
    end subroutine set_user_load
 
    !> Energies and momenta of a state.

@@ -90,6 +90,7 @@ module rodyn_case_config
       real(wp) :: rise_time = 0.0_wp                      !! of smooth_step [s]
       real(wp), allocatable :: times(:)                   !! of table, increasing [s]
       real(wp), allocatable :: values(:)                  !! of table [N] or [N m]
+      character(len=name_length) :: after = 'zero'        !! of table, beyond its last time: 'zero' or 'hold'
    end type load_config
 
    !> One &kink_program group

@@ -134,6 +134,7 @@ contains
       if (law_takes(load%law, 'rise_time')) call visitor%field('rise_time', load%rise_time)
       if (law_takes(load%law, 'times')) call visitor%field('times', load%times)
       if (law_takes(load%law, 'values')) call visitor%field('values', load%values)
+      if (law_takes(load%law, 'after')) call visitor%word_field('after', load%after)
       call visitor%close_group()
    end subroutine visit_load
 
@@ -204,7 +205,7 @@ contains
       call visitor%close_group()
    end subroutine visit_output
 
-   !> Which of the keys value, rate, rise_time, times and values a law has.
+   !> Which of the keys value, rate, rise_time, times, values and after a law has.
    pure logical function law_takes(law, key)
       character(len=*), intent(in) :: law, key
       select case (law)
@@ -215,7 +216,7 @@ contains
       case ('smooth_step')
          law_takes = key == 'value' .or. key == 'rise_time'
       case ('table')
-         law_takes = key == 'times' .or. key == 'values'
+         law_takes = key == 'times' .or. key == 'values' .or. key == 'after'
       case default
          law_takes = .false.
       end select

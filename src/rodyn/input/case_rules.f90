@@ -7,12 +7,13 @@ module rodyn_case_rules
    use rodyn_hinge_rules, only: check_moving_hinges
    use rodyn_law_rules, only: check_law_keys, check_table
    use rodyn_rod_profile, only: rod_profile, new_rod_profile, smallest_value
+   use rodyn_switch_times, only: same_time
    use rodyn_text, only: short_text, to_text
    implicit none (type, external)
    private
    public :: check_case
 
-   character(len=*), parameter :: law_keys(5) = [character(len=9) :: 'value', 'rate', 'rise_time', 'times', 'values']
+   character(len=*), parameter :: law_keys(6) = [character(len=9) :: 'value', 'rate', 'rise_time', 'times', 'values', 'after']
 
 contains
 
@@ -35,10 +36,11 @@ contains
          call check_target(checked, i, config%loads(i), config%chain%n_rods)
          associate (law => config%loads(i)%law)
             call check_law_keys(checked, 'load', i, law, law_keys, [(law_takes(law, trim(law_keys(k))), k=1, size(law_keys))], &
-                                law_keys /= 'rise_time')
+                                law_keys /= 'rise_time' .and. law_keys /= 'after')
          end associate
          call check_times(checked, i, config%loads(i))
-         if (config%loads(i)%law == 'table') call check_table(checked, 'load', i, config%loads(i)%times, config%loads(i)%values)
+         if (config%loads(i)%law == 'table') call check_table(checked, 'load', i, config%loads(i)%times, &
+                                                                     config%loads(i)%values, .false.)
       end do
       call check_moving_hinges(checked, config)
    end subroutine check_case
@@ -310,7 +312,7 @@ contains
 
       if (.not. (is_sound(checked, 'load', i, 't_start') .and. is_sound(checked, 'load', i, 't_end'))) return
       if (.not. is_given(checked, 'load', i, 't_end') .and. .not. is_sound(checked, 'case', 1, 't_end')) return
-      if (load%t_start > load%t_end) then
+      if (load%t_start > load%t_end .and. .not. same_time(load%t_start, load%t_end)) then
          if (is_given(checked, 'load', i, 't_start')) then
             call blame(checked, 'load', i, 't_start', 'must not be after t_end = '//short_text(load%t_end)//' [s]')
          else
@@ -318,7 +320,8 @@ contains
          end if
       else if (load%law == 'smooth_step' .and. is_sound(checked, 'load', i, 'rise_time') .and. &
                is_sound(checked, 'load', i, 'law')) then
-         if (load%rise_time > load%t_end - load%t_start) then
+         if (load%t_start + load%rise_time > load%t_end .and. &
+             .not. same_time(load%t_start + load%rise_time, load%t_end)) then
             call blame(checked, 'load', i, 'rise_time', 'must not exceed t_end - t_start = ' &
                //short_text(load%t_end - load%t_start)//' [s]')
          else if (.not. load%rise_time > 0.0_wp) then

@@ -5,6 +5,7 @@ module rodyn_hinge_rules
    use rodyn_case_fields, only: kink_law_takes
    use rodyn_checked_document, only: checked_document, blame, is_given, is_sound, no_such
    use rodyn_law_rules, only: check_law_keys, check_table
+   use rodyn_switch_times, only: same_time
    implicit none (type, external)
    private
    public :: check_moving_hinges
@@ -56,13 +57,13 @@ contains
       type(kink_config), intent(in) :: program
 
       if (program%law == 'table') then
-         call check_table(checked, 'kink_program', i, program%times, program%values)
+         call check_table(checked, 'kink_program', i, program%times, program%values, .true.)
          return
       end if
       if (.not. (is_sound(checked, 'kink_program', i, 't_start') .and. is_sound(checked, 'kink_program', i, 't_end'))) return
-      if (program%t_start > program%t_end) then
+      if (program%t_start > program%t_end .and. .not. same_time(program%t_start, program%t_end)) then
          call blame(checked, 'kink_program', i, 't_start', 'must not be after t_end')
-      else if (program%t_start >= program%t_end .and. program%law /= 'ramp') then
+      else if (same_time(program%t_start, program%t_end) .and. program%law /= 'ramp') then
          call blame(checked, 'kink_program', i, 't_start', "must be before t_end; only law = 'ramp' may be a step")
       end if
    end subroutine check_program_times
@@ -77,7 +78,7 @@ contains
       integer :: h
 
       if (.not. is_sound(checked, 'kink_program', i, 'hinge') .or. .not. is_sound(checked, 'kink_program', i, 'law')) return
-      step = program%law == 'ramp' .and. program%t_start >= program%t_end
+      step = program%law == 'ramp' .and. same_time(program%t_start, program%t_end)
       if (step .and. is_sound(checked, 'chain', 1, 'hinge_damping') .and. &
           program%hinge < min(config%chain%n_rods, size(config%chain%hinge_damping))) then
          if (config%chain%hinge_damping(program%hinge) > 0.0_wp) call blame(checked, 'kink_program', i, 'hinge', &

@@ -2,6 +2,7 @@
 module rodyn_law_rules
    use rodyn_kinds, only: wp
    use rodyn_checked_document, only: checked_document, blame, entry_of, is_given, is_sound, require
+   use rodyn_switch_times, only: same_time
    use rodyn_text, only: short_text, to_text
    implicit none (type, external)
    private
@@ -32,19 +33,20 @@ contains
       end do
    end subroutine check_law_keys
 
-   !> As many values as times, two at least, and times that increase.
-   subroutine check_table(checked, group, i, times, values)
+   !> As many values as times, two at least, and times that increase: of a spline by more than rounding.
+   subroutine check_table(checked, group, i, times, values, spline)
       type(checked_document), intent(inout) :: checked
       character(len=*), intent(in) :: group
       integer, intent(in) :: i !! which of these groups
       real(wp), allocatable, intent(in) :: times(:)  !! [s]
       real(wp), allocatable, intent(in) :: values(:) !! both allocated where they are given rightly
+      logical, intent(in) :: spline !! smooth at its times; a load may jump there
       integer :: k
 
       if (entry_of(checked, group, i, 'times') == 0) return
       if (size(times) < 2) call blame(checked, group, i, 'times', 'must be two values at least')
       do k = 2, size(times)
-         if (times(k) > times(k - 1)) cycle
+         if (times(k) > times(k - 1) .and. .not. (spline .and. same_time(times(k), times(k - 1)))) cycle
          call blame(checked, group, i, 'times', 'must increase, but value '//to_text(k)//', '//short_text(times(k))// &
                     ', follows '//short_text(times(k - 1))//' [s]')
          exit

@@ -10,6 +10,7 @@ module rodyn_ensemble
    use rodyn_lane_dop853, only: lane_dop853, new_lane_dop853, at_nothing, at_output, at_stop, at_failure
    use rodyn_lane_motion, only: lane_motion, new_lane_motion
    use rodyn_motion, only: motion_type
+   use rodyn_switch_times, only: interval_ends
    implicit none (type, external)
    private
    public :: ensemble_member, ensemble_client, run_ensemble
@@ -152,9 +153,7 @@ contains
       class(ensemble_member), pointer, intent(inout) :: member
 
       ensemble%seats(lane)%member => member
-      associate (switches => member%motion%dynamics%scene%loads%switches)
-         member%ends = [pack(switches, switches < member%t_end), member%t_end]
-      end associate
+      member%ends = interval_ends(member%motion%dynamics%scene%switches, member%t_end)
       member%t = 0.0_wp
       member%segment = 1
       member%next = 1

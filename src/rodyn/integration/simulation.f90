@@ -4,6 +4,7 @@ module rodyn_simulation
    use rodyn_errors, only: error_type
    use rodyn_motion, only: motion_type
    use rodyn_integrator, only: integrator_type
+   use rodyn_switch_times, only: interval_ends, same_time
    implicit none (type, external)
    private
    public :: observer_type, output_times, listed_times, even_times, simulate
@@ -82,9 +83,7 @@ contains
       real(wp), allocatable :: ends(:)
       integer :: segment, next
 
-      associate (switches => motion%dynamics%scene%switches)
-         ends = [pack(switches, switches < t_end), t_end]
-      end associate
+      ends = interval_ends(motion%dynamics%scene%switches, t_end)
       t = 0.0_wp
       next = 1
       do segment = 1, size(ends)
@@ -111,6 +110,7 @@ contains
          if (next <= times%n) target_time = min(times%time(next), t_stop)
          call integrator%advance(target_time, y, t, error)
          if (allocated(error)) return
+         if (integrator%at_event .and. same_time(t, t_stop)) t = t_stop ! no method can step from the one to the other
          call observe_now()
          if (.not. allocated(error)) call integrator%heed_monitor(t, error)
          if (allocated(error) .or. .not. integrator%at_event) return

@@ -8,6 +8,7 @@ module rodyn_step_limit
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type, raise, exit_bad_input
    use rodyn_scene, only: scene_type
+   use rodyn_switch_times, only: interval_ends
    use rodyn_integrator, only: solver_options, time_text
    use rodyn_stability_function, only: stability_function, stability_function_of
    use rodyn_fast_eigenvalues, only: fast_eigenvalues
@@ -55,7 +56,7 @@ contains
       real(wp), allocatable :: ends(:)
       integer :: i
 
-      ends = [0.0_wp, pack(scene%switches, scene%switches < t_end), t_end]
+      ends = [0.0_wp, interval_ends(scene%switches, t_end)]
       longest_step = 0.0_wp
       do i = 2, size(ends)
          associate (span => ends(i) - ends(i - 1))

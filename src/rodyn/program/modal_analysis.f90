@@ -73,7 +73,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: y(:)
 
-      if (.not. (loads .or. equilibrium)) call new_load_set(motion%dynamics%scene%loads, [load_config ::], config%t_end)
+      if (.not. (loads .or. equilibrium)) call new_load_set(motion%dynamics%scene%loads, [load_config ::])
       call motion%dynamics%set_regime(0.0_wp, minval([motion%dynamics%scene%switches, config%t_end]))
       call initial_state(motion, config%initial, y)
       if (motion%events%watches) then

@@ -2,6 +2,7 @@
 module rodyn_description
    use rodyn_kinds, only: wp
    use rodyn_scene, only: scene_type
+   use rodyn_switch_times, only: same_time
    use rodyn_integrator, only: time_text
    implicit none (type, external)
    private
@@ -55,8 +56,8 @@ contains
                return
             end if
             call note(.true., count_text(size(loads), 'load'))
-            call note(any(loads%target == 'node'), 'loads on nodes')
-            if (any(scene%loads%switches == maxval(loads%t_end))) &
+            call note(any(loads%node > 0), 'loads on nodes')
+            if (any(same_time(scene%switches, maxval(loads%t_end)))) &
                call note(.false., 'loads after t = '//time_text(maxval(loads%t_end))//' s')
          end associate
       end subroutine note_loads

@@ -6,9 +6,10 @@
 module rodyn_kink_program
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: kink_config
+   use rodyn_switch_times, only: same_time
    implicit none (type, external)
    private
-   public :: kink_program, kink_set, kink_regime, new_kink_set, new_kink_regime, evaluate_kinks, program_value
+   public :: kink_program, kink_set, kink_regime, new_kink_set, kink_times, new_kink_regime, evaluate_kinks, program_value
 
    integer, parameter :: law_ramp = 1, law_smooth_step = 2, law_sine = 3, law_table = 4
 
@@ -23,10 +24,9 @@ module rodyn_kink_program
       real(wp), allocatable :: bend(:)             !! second derivatives there [rad/s^2]
    end type kink_program
 
-   !> All programs of a case and the times where any of them is not smooth.
+   !> All programs of a case.
    type :: kink_set
       type(kink_program), allocatable :: programs(:)
-      real(wp), allocatable :: switches(:) !! within (0, t_end), in no order [s]
       real(wp), allocatable :: constant(:) !! kinks without the programs (0:n-1) [rad]
    end type kink_set
 
@@ -38,27 +38,34 @@ module rodyn_kink_program
 
 contains
 
-   !> Collect the programs and their switch times.
-   subroutine new_kink_set(set, kink, programs, t_end)
+   !> Collect the programs.
+   subroutine new_kink_set(set, kink, programs)
       type(kink_set), intent(out) :: set
       real(wp), intent(in) :: kink(0:)                      !! kinks of `&chain` (0:n-1) [rad]
       type(kink_config), intent(in), optional :: programs(:) !! absent (not allocated): none
-      real(wp), intent(in) :: t_end                         !! end of the run [s]
-      real(wp), allocatable :: times(:)
       integer :: i
 
       allocate (set%constant(0:size(kink) - 1), source=kink)
-      allocate (set%switches(0), set%programs(0))
+      allocate (set%programs(0))
       if (.not. present(programs)) return
       deallocate (set%programs)
       allocate (set%programs(size(programs)))
       do i = 1, size(programs)
          call new_program(set%programs(i), programs(i))
-         times = [programs(i)%t_start, programs(i)%t_end]
-         if (programs(i)%law == 'table') times = programs(i)%times
-         set%switches = [set%switches, pack(times, times > 0.0_wp .and. times < t_end)]
       end do
    end subroutine new_kink_set
+
+   !> All times where some program is not smooth, in no order [s].
+   pure function kink_times(set) result(times)
+      type(kink_set), intent(in) :: set
+      real(wp), allocatable :: times(:)
+      integer :: i
+
+      times = [set%programs%t_start, set%programs%t_end]
+      do i = 1, size(set%programs)
+         if (set%programs(i)%law == law_table) times = [times, set%programs(i)%times]
+      end do
+   end function kink_times
 
    !> One program as it is given, a table with its spline.
    subroutine new_program(program, given)
@@ -84,6 +91,7 @@ contains
          program%bend = clamped_spline(given%times, given%values)
       case default
          program%law = law_ramp
+         if (same_time(given%t_start, given%t_end)) program%t_end = given%t_start ! a step
       end select
    end subroutine new_program
 

@@ -1,37 +1,52 @@
 !> Forces and moments as functions of time, docs/model.md sec. 2, and `&load`.
 !>
-!> A load is zero outside [t_start, t_end]. Between two neighbouring switch times nothing appears, vanishes or
-!> bends: such an interval is a regime, chosen once, in which constant loads are mere numbers and a load that
-!> does not act does not exist.
+!> A load is zero outside [t_start, t_end], and a table is zero before its first time and, unless it is held, after its last.
+!> Between two neighbouring switch times nothing appears, vanishes or bends: such an interval is a regime, chosen once, in which
+!> constant loads are mere numbers and a load that does not act does not exist.
 module rodyn_loads
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: load_config
    implicit none (type, external)
    private
-   public :: load_set, new_load_set, load_regime, new_load_regime, load_forces, evaluate_loads, load_value
+   public :: load_set, new_load_set, load_times, load_regime, new_load_regime, load_forces, evaluate_loads
 
    !> Words of the namelist as numbers, so that the right-hand side compares no text.
    integer, parameter :: law_constant = 1, law_sine_squared = 2, law_smooth_step = 3, law_table = 4
 
-   !> A load that changes within a regime.
-   type :: varying_load
+   !> One load.
+   type :: load_type
       integer :: law = law_constant
-      integer :: node = 0      !! 1..n; 0: the spacecraft
-      integer :: component = 1 !! 1: X, 2: Y, 3: M
-      type(load_config) :: given
-   end type varying_load
+      integer :: node = 0          !! 1..n; 0: the spacecraft
+      integer :: component = 1     !! 1: X, 2: Y, 3: M
+      real(wp) :: t_start = 0.0_wp, t_end = 0.0_wp !! it acts in between [s]
+      real(wp) :: value = 0.0_wp   !! amplitude [N] or [N m]
+      real(wp) :: rate = 0.0_wp    !! of sine_squared [rad/s]
+      real(wp) :: rise = 0.0_wp    !! of smooth_step [s]
+      real(wp), allocatable :: times(:), values(:) !! of a table [s], [N] or [N m]
+   contains
+      procedure :: drops
+   end type load_type
 
-   !> All loads of a case and the times where any of them is not smooth.
+   !> All loads of a case.
    type :: load_set
-      type(load_config), allocatable :: loads(:)
-      real(wp), allocatable :: switches(:) !! increasing, within (0, t_end) [s]
+      type(load_type), allocatable :: loads(:)
    end type load_set
+
+   !> What a load is within one regime.
+   type :: load_piece
+      integer :: law = law_constant
+      integer :: node = 0
+      integer :: component = 1
+      real(wp) :: value = 0.0_wp, rate = 0.0_wp    !! as above; of a table, the value when the piece begins
+      real(wp) :: t_start = 0.0_wp, span = 1.0_wp  !! of the rise, or of this piece of the table [s]
+      real(wp) :: change = 0.0_wp                  !! of the value in this piece of the table
+   end type load_piece
 
    !> What acts between two switches.
    type :: load_regime
       logical :: on_spacecraft = .false. !! some load acts on the spacecraft
       logical :: on_nodes = .false.      !! some load acts on a node
-      type(varying_load), allocatable :: varying(:) !! those that change with time
+      type(load_piece), allocatable :: varying(:)  !! those that change with time
       real(wp) :: constant_base(3) = 0.0_wp        !! X_C, Y_C [N], M_C [N m] of all others
       real(wp), allocatable :: constant_node(:, :) !! X, Y of all others (2, n), size 0 if nodes are free [N]
    end type load_regime
@@ -44,81 +59,157 @@ module rodyn_loads
 
 contains
 
-   !> Collect the loads and their switch times.
-   subroutine new_load_set(set, loads, t_end)
+   !> Collect the loads.
+   subroutine new_load_set(set, loads)
       type(load_set), intent(out) :: set
       type(load_config), intent(in), optional :: loads(:) !! absent (not allocated): none
-      real(wp), intent(in) :: t_end                       !! end of the run [s]
-      integer :: i, j
+      integer :: i
 
-      allocate (set%loads(0), set%switches(0))
-      if (.not. present(loads)) return
-      set%loads = loads
+      if (.not. present(loads)) then
+         allocate (set%loads(0))
+         return
+      end if
+      allocate (set%loads(size(loads)))
       do i = 1, size(loads)
-         associate (load => loads(i))
-            call add_switch(set%switches, load%t_start, t_end)
-            call add_switch(set%switches, load%t_end, t_end)
-            if (load%law == 'smooth_step') call add_switch(set%switches, load%t_start + rise_of(load), t_end)
-            if (load%law /= 'table') cycle
-            do j = 1, size(load%times)
-               if (load%times(j) > load%t_start .and. load%times(j) < load%t_end) &
-                  call add_switch(set%switches, load%times(j), t_end)
-            end do
-         end associate
+         call new_load(set%loads(i), loads(i))
       end do
    end subroutine new_load_set
 
-   !> Insert one time in order, once, if it lies inside the run.
-   subroutine add_switch(switches, t, t_end)
-      real(wp), allocatable, intent(inout) :: switches(:)
-      real(wp), intent(in) :: t, t_end
-      integer :: i
+   !> One load as it is given.
+   subroutine new_load(load, given)
+      type(load_type), intent(out) :: load
+      type(load_config), intent(in) :: given
 
-      if (t <= 0.0_wp .or. t >= t_end) return
-      if (any(switches == t)) return
-      i = count(switches < t)
-      switches = [switches(:i), t, switches(i + 1:)]
-   end subroutine add_switch
+      if (given%target == 'node') load%node = given%node
+      load%component = index('XYM', given%component(1:1))
+      load%t_start = given%t_start
+      load%t_end = given%t_end
+      load%value = given%value
+      load%rate = given%rate
+      select case (given%law)
+      case ('sine_squared')
+         load%law = law_sine_squared
+      case ('smooth_step')
+         load%law = law_smooth_step
+         load%rise = given%rise_time
+         if (load%rise <= 0.0_wp) load%rise = given%t_end - given%t_start
+      case ('table')
+         load%law = law_table
+         load%times = given%times
+         load%values = given%values
+         load%t_start = max(given%t_start, given%times(1))
+         if (given%after /= 'hold') load%t_end = min(given%t_end, given%times(size(given%times)))
+      case default
+         load%law = law_constant
+      end select
+   end subroutine new_load
 
-   !> What acts between two neighbouring switch times (or ends of the run).
+   !> Does a table end with the load still on?
+   pure logical function drops(self)
+      class(load_type), intent(in) :: self
+      drops = .false.
+      if (self%law /= law_table) return
+      associate (last => size(self%times))
+         drops = abs(self%values(last)) > 0.0_wp .and. self%t_end >= self%times(last) .and. self%t_end <= self%times(last)
+      end associate
+   end function drops
+
+   !> All times where some load is not smooth, in no order [s].
+   pure function load_times(set) result(times)
+      type(load_set), intent(in) :: set
+      real(wp), allocatable :: times(:)
+      integer :: at, i, n
+
+      n = 3*size(set%loads)
+      do i = 1, size(set%loads)
+         if (set%loads(i)%law == law_table) n = n + size(set%loads(i)%times)
+      end do
+      allocate (times(n))
+      at = 0
+      do i = 1, size(set%loads)
+         associate (load => set%loads(i))
+            times(at + 1:at + 3) = [load%t_start, load%t_end, load%t_start + load%rise]
+            at = at + 3
+            if (load%law /= law_table) cycle
+            times(at + 1:at + size(load%times)) = min(max(load%times, load%t_start), load%t_end)
+            at = at + size(load%times)
+         end associate
+      end do
+   end function load_times
+
+   !> What acts between two neighbouring switch times (or ends of the run). The middle decides, for which the rounding of
+   !> times does not matter.
    subroutine new_load_regime(regime, set, t_from, t_to, n)
       type(load_regime), intent(out) :: regime
       type(load_set), intent(in) :: set
       real(wp), intent(in) :: t_from, t_to !! [s]
       integer, intent(in) :: n             !! nodes
-      logical :: acts(size(set%loads)), varies(size(set%loads))
+      type(load_piece), allocatable :: pieces(:)
+      integer, allocatable :: acting(:)
       real(wp) :: middle
-      integer :: i, component
+      integer :: i
 
       middle = t_from + 0.5_wp*(t_to - t_from)
-      acts = set%loads%t_start <= middle .and. middle <= set%loads%t_end
-      varies = [(is_varying(set%loads(i), middle), i=1, size(varies))]
-      regime%on_nodes = any(acts .and. set%loads%target == 'node')
-      regime%on_spacecraft = any(acts .and. set%loads%target /= 'node')
-      allocate (regime%varying(count(acts .and. varies)))
+      acting = pack([(i, i=1, size(set%loads))], set%loads%t_start < middle .and. middle < set%loads%t_end)
+      allocate (pieces(size(acting)))
+      do i = 1, size(acting)
+         pieces(i) = piece_of(set%loads(acting(i)), middle)
+      end do
+      regime%on_nodes = any(pieces%node > 0)
+      regime%on_spacecraft = any(pieces%node == 0)
       allocate (regime%constant_node(2, merge(n, 0, regime%on_nodes)), source=0.0_wp)
-      do i = 1, size(set%loads)
-         if (.not. acts(i)) cycle
-         if (varies(i)) then
-            associate (load => regime%varying(count(acts(:i) .and. varies(:i))))
-               load%given = set%loads(i)
-               load%law = law_of(set%loads(i))
-               load%component = component_of(set%loads(i))
-               if (set%loads(i)%target == 'node') load%node = set%loads(i)%node
-            end associate
-            cycle
-         end if
-         associate (load => set%loads(i))
-            component = component_of(load)
-            if (load%target == 'node') then
-               regime%constant_node(component, load%node) = regime%constant_node(component, load%node) + &
-                                                            load_value(load, middle)
+      regime%varying = pack(pieces, pieces%law /= law_constant)
+      do i = 1, size(pieces)
+         associate (piece => pieces(i))
+            if (piece%law /= law_constant) cycle
+            if (piece%node > 0) then
+               regime%constant_node(piece%component, piece%node) = regime%constant_node(piece%component, piece%node) + piece%value
             else
-               regime%constant_base(component) = regime%constant_base(component) + load_value(load, middle)
+               regime%constant_base(piece%component) = regime%constant_base(piece%component) + piece%value
             end if
          end associate
       end do
    end subroutine new_load_regime
+
+   !> What a load is around a time at which it acts. Once a step has risen, and where a table is level, it is constant.
+   pure type(load_piece) function piece_of(load, t) result(piece)
+      type(load_type), intent(in) :: load
+      real(wp), intent(in) :: t !! [s]
+      integer :: i
+
+      piece = load_piece(load%law, load%node, load%component, load%value, load%rate, load%t_start, load%rise)
+      select case (load%law)
+      case (law_smooth_step)
+         if (t > load%t_start + load%rise) piece%law = law_constant
+      case (law_table)
+         i = last_before(load%times, t)
+         piece%value = load%values(i)
+         if (i < size(load%times)) then
+            piece%t_start = load%times(i)
+            piece%span = load%times(i + 1) - load%times(i)
+            piece%change = load%values(i + 1) - load%values(i)
+         end if
+         if (.not. abs(piece%change) > 0.0_wp) piece%law = law_constant
+      end select
+   end function piece_of
+
+   !> The last of the times of a table that is not after t; 1 if none is.
+   pure integer function last_before(times, t) result(low)
+      real(wp), intent(in) :: times(:)
+      real(wp), intent(in) :: t
+      integer :: high, middle
+
+      low = 1
+      high = size(times) + 1
+      do while (high - low > 1)
+         middle = (low + high)/2
+         if (times(middle) <= t) then
+            low = middle
+         else
+            high = middle
+         end if
+      end do
+   end function last_before
 
    !> Forces at time t. Call first with `fresh`, at the start of a regime; then only what varies is written.
    pure subroutine evaluate_loads(forces, regime, t, fresh)
@@ -142,99 +233,31 @@ contains
       do i = 1, size(regime%varying)
          associate (load => regime%varying(i), component => regime%varying(i)%component)
             if (load%node > 0) then
-               forces%node(component, load%node) = forces%node(component, load%node) + value_at(load%law, load%given, t)
+               forces%node(component, load%node) = forces%node(component, load%node) + value_at(load, t)
             else
-               forces%base(component) = forces%base(component) + value_at(load%law, load%given, t)
+               forces%base(component) = forces%base(component) + value_at(load, t)
             end if
          end associate
       end do
    end subroutine evaluate_loads
 
-   !> The law of a load at time t, whether it acts then or not [N] or [N m].
-   pure real(wp) function load_value(load, t)
-      type(load_config), intent(in) :: load
-      real(wp), intent(in) :: t !! [s]
-      load_value = value_at(law_of(load), load, t)
-   end function load_value
-
-   !> The same with the law as a number.
-   pure real(wp) function value_at(law, load, t)
-      integer, intent(in) :: law
-      type(load_config), intent(in) :: load
+   !> A piece of a load at time t [N] or [N m].
+   pure real(wp) function value_at(piece, t)
+      type(load_piece), intent(in) :: piece
       real(wp), intent(in) :: t !! [s]
       real(wp) :: x
 
-      select case (law)
+      select case (piece%law)
       case (law_sine_squared)
-         value_at = load%value*sin(load%rate*t)**2
+         value_at = piece%value*sin(piece%rate*t)**2
       case (law_smooth_step) ! continuous acceleration: value and two derivatives vanish at the start
-         x = min(max((t - load%t_start)/rise_of(load), 0.0_wp), 1.0_wp)
-         value_at = load%value*x**3*(10.0_wp - x*(15.0_wp - 6.0_wp*x))
+         x = min(max((t - piece%t_start)/piece%span, 0.0_wp), 1.0_wp)
+         value_at = piece%value*x**3*(10.0_wp - x*(15.0_wp - 6.0_wp*x))
       case (law_table)
-         value_at = interpolate(load%times, load%values, t)
+         value_at = piece%value + piece%change*((t - piece%t_start)/piece%span)
       case default
-         value_at = load%value
+         value_at = piece%value
       end select
    end function value_at
-
-   !> Number of a law.
-   pure integer function law_of(load)
-      type(load_config), intent(in) :: load
-      select case (load%law)
-      case ('sine_squared')
-         law_of = law_sine_squared
-      case ('smooth_step')
-         law_of = law_smooth_step
-      case ('table')
-         law_of = law_table
-      case default
-         law_of = law_constant
-      end select
-   end function law_of
-
-   !> Piecewise linear; constant beyond the ends of the table.
-   pure real(wp) function interpolate(times, values, t)
-      real(wp), intent(in) :: times(:), values(:)
-      real(wp), intent(in) :: t
-      integer :: low, high, middle
-
-      low = 1
-      high = size(times)
-      interpolate = values(low)
-      if (t <= times(low)) return
-      interpolate = values(high)
-      if (t >= times(high)) return
-      do while (high - low > 1)
-         middle = (low + high)/2
-         if (times(middle) <= t) then
-            low = middle
-         else
-            high = middle
-         end if
-      end do
-      interpolate = values(low) + (values(high) - values(low))*((t - times(low))/(times(high) - times(low)))
-   end function interpolate
-
-   !> False if the load is constant around a time inside its regime.
-   pure logical function is_varying(load, t)
-      type(load_config), intent(in) :: load
-      real(wp), intent(in) :: t
-      is_varying = load%law /= 'constant'
-      if (load%law == 'smooth_step') is_varying = t < load%t_start + rise_of(load)
-      if (load%law == 'table') is_varying = t > load%times(1) .and. t < load%times(size(load%times))
-   end function is_varying
-
-   !> Rise time of a smooth step; by default all the time it acts [s].
-   pure real(wp) function rise_of(load)
-      type(load_config), intent(in) :: load
-      rise_of = load%rise_time
-      if (rise_of <= 0.0_wp) rise_of = load%t_end - load%t_start
-   end function rise_of
-
-   !> 1: X, 2: Y, 3: M.
-   pure integer function component_of(load)
-      type(load_config), intent(in) :: load
-      component_of = index('XYM', load%component(1:1))
-   end function component_of
 
 end module rodyn_loads

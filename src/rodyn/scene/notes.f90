@@ -4,7 +4,9 @@ module rodyn_notes
    use rodyn_errors, only: error_type
    use rodyn_scene, only: scene_type
    use rodyn_frequencies, only: natural_frequencies
+   use rodyn_switch_times, only: same_time
    use rodyn_text, only: to_text, formatted
+   use rodyn_integrator, only: time_text
    implicit none (type, external)
    private
    public :: notes_on, neglected_damping
@@ -22,11 +24,19 @@ contains
       logical, intent(in) :: ledger   !! energies are recorded
       character(len=:), allocatable :: text
       real(wp) :: term, frequency
-      integer :: hinge
+      integer :: hinge, i
 
       text = ''
       if (ledger .and. scene%dynamic_bending .and. .not. scene%consistent) &
          text = "formulation 'paper' has no exact energy: the energy residual includes the formulation's own"
+      do i = 1, size(scene%loads%loads)
+         associate (load => scene%loads%loads(i))
+            if (.not. load%drops() .or. .not. any(same_time(scene%switches, load%t_end))) cycle
+            if (len(text) > 0) text = text//new_line('a')
+            text = text//'load '//to_text(i)//': its table ends at t = '//time_text(load%t_end)//' s, from then on it is zero; '// &
+                   "after = 'hold' holds its last value"
+         end associate
+      end do
       call neglected_damping(scene, q, term, hinge, frequency)
       if (.not. term > least_neglected) return
       if (len(text) > 0) text = text//new_line('a')

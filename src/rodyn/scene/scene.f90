@@ -15,8 +15,10 @@ module rodyn_scene
    use rodyn_rod_profile, only: rod_profile, new_rod_profile
    use rodyn_spacecraft, only: spacecraft_body
    use rodyn_hinge_law, only: hinge_law, new_hinge_law
-   use rodyn_loads, only: load_set, new_load_set
-   use rodyn_kink_program, only: kink_set, new_kink_set
+   use rodyn_loads, only: load_set, new_load_set, load_times
+   use rodyn_kink_program, only: kink_set, new_kink_set, kink_times
+   use rodyn_sorting, only: sorted_order
+   use rodyn_switch_times, only: add_switches, interval_ends, united_time
    implicit none (type, external)
    private
    public :: scene_type, new_scene
@@ -41,7 +43,7 @@ module rodyn_scene
       type(hinge_law) :: hinges
       type(load_set) :: loads
       type(kink_set) :: kinks
-      real(wp), allocatable :: switches(:)     !! all times within the run where a force, kink or lock is not smooth, in order [s]
+      real(wp), allocatable :: switches(:)     !! times within the run where a force, kink or lock is not smooth, increasing [s]
    contains
       procedure :: phi_at
       procedure :: alpha_at
@@ -125,30 +127,31 @@ contains
       if (allocated(error)) return
       call compile_nodes(scene, config, error)
       if (allocated(error)) return
-      call new_kink_set(scene%kinks, config%chain%kink, config%kink_programs, config%t_end)
+      call new_kink_set(scene%kinks, config%chain%kink, config%kink_programs)
       call new_hinge_law(scene%hinges, config%chain, reshape([(scene%rods(scene%rod_of(k))%flexibility, k=1, scene%n)], &
                                                              [3, scene%n]), scene%quasistatic, config%model%dampers == 'exact', &
                          size(scene%kinks%programs) > 0, config%hinges)
       scene%n_q = scene%n_dof + size(scene%hinges%relaxing)
-      call new_load_set(scene%loads, config%loads, config%t_end)
+      call new_load_set(scene%loads, config%loads)
       call collect_switches(scene, config%t_end)
    end subroutine new_scene
 
-   !> Switches of loads, kinks and releases.
+   !> Switches of loads, kinks and releases. What is released at a switch is released then, to the last digit.
    subroutine collect_switches(scene, t_end)
       type(scene_type), intent(inout) :: scene
       real(wp), intent(in) :: t_end !! [s]
-      real(wp), allocatable :: all_times(:)
-      real(wp) :: next
+      real(wp), allocatable :: times(:)
+      integer :: i
 
-      all_times = [scene%loads%switches, scene%kinks%switches, scene%hinges%mechanisms%release_time]
-      all_times = pack(all_times, all_times > 0.0_wp .and. all_times < t_end)
-      allocate (scene%switches(0))
-      do while (size(all_times) > 0)
-         next = minval(all_times)
-         scene%switches = [scene%switches, next]
-         all_times = pack(all_times, all_times > next)
-      end do
+      associate (mechanisms => scene%hinges%mechanisms)
+         times = [load_times(scene%loads), kink_times(scene%kinks), mechanisms%release_time]
+         allocate (scene%switches(0))
+         call add_switches(scene%switches, interval_ends(pack(times, times > 0.0_wp), t_end))
+         scene%switches = scene%switches(:size(scene%switches) - 1) ! t_end itself
+         do i = 1, size(mechanisms)
+            mechanisms(i)%release_time = united_time(mechanisms(i)%release_time, scene%switches)
+         end do
+      end associate
    end subroutine collect_switches
 
    !> What a combination of choices forbids, docs/model.md sec. 5.
@@ -281,63 +284,6 @@ contains
       end do
       first = first(:n_distinct)
    end subroutine find_distinct
-
-   !> Indices that sort the columns of `key` (bottom-up merge sort, stable).
-   pure function sorted_order(key) result(order)
-      real(wp), intent(in) :: key(:, :)
-      integer, allocatable :: order(:)
-      integer, allocatable :: other(:)
-      integer :: n, width, low, middle, high, i, j, m
-
-      n = size(key, 2)
-      allocate (order(n), other(n))
-      order = [(i, i=1, n)]
-      width = 1
-      do while (width < n)
-         do low = 1, n, 2*width
-            middle = min(low + width, n + 1)
-            high = min(low + 2*width, n + 1)
-            i = low
-            j = middle
-            do m = low, high - 1
-               if (j >= high) then
-                  other(m) = order(i)
-                  i = i + 1
-               else if (i >= middle) then
-                  other(m) = order(j)
-                  j = j + 1
-               else if (precedes(key(:, order(j)), key(:, order(i)))) then
-                  other(m) = order(j)
-                  j = j + 1
-               else
-                  other(m) = order(i)
-                  i = i + 1
-               end if
-            end do
-         end do
-         call swap(order, other)
-         width = 2*width
-      end do
-   end function sorted_order
-
-   pure subroutine swap(a, b)
-      integer, allocatable, intent(inout) :: a(:), b(:)
-      integer, allocatable :: c(:)
-      call move_alloc(a, c)
-      call move_alloc(b, a)
-      call move_alloc(c, b)
-   end subroutine swap
-
-   !> Lexical order of two columns.
-   pure logical function precedes(a, b)
-      real(wp), intent(in) :: a(:), b(:)
-      integer :: i
-      precedes = .false.
-      do i = 1, size(a)
-         if (a(i) < b(i)) precedes = .true.
-         if (a(i) /= b(i)) return
-      end do
-   end function precedes
 
    !> Node masses, with the mass of each rod shared by its two nodes when lumped. Every apparent mass that the
    !> recursion divides by must be positive, so no rod and node may both be without mass.

@@ -21,6 +21,7 @@ module rodyn_sweep_case
    use rodyn_run, only: options_of
    use rodyn_run_file, only: run_row, new_run_row
    use rodyn_scene, only: scene_type, new_scene
+   use rodyn_switch_times, only: same_time
    use rodyn_simulation, only: observer_type, listed_times, simulate
    use rodyn_sweep_config, only: sweep_config, is_ratio, value_text
    use rodyn_step_limit, only: check_fixed_step
@@ -412,7 +413,7 @@ contains
       real(wp) :: next_probe, next_output
       integer :: n, p, k, n_probes, n_outputs
 
-      n_probes = count(probe_times <= config%t_end)
+      n_probes = count(probe_times <= config%t_end .or. same_time(probe_times, config%t_end))
       n_outputs = merge(config%n_outputs + 1, 0, outputs)
       allocate (times(n_probes + n_outputs))
       allocate (probe_of(size(times)), output_of(size(times)), source=0)
@@ -422,7 +423,7 @@ contains
       do while (p <= n_probes .or. k <= n_outputs)
          next_probe = huge(1.0_wp)
          next_output = huge(1.0_wp)
-         if (p <= n_probes) next_probe = probe_times(p)
+         if (p <= n_probes) next_probe = min(probe_times(p), config%t_end)
          if (k <= n_outputs) next_output = config%t_end*(real(k - 1, wp)/config%n_outputs)
          n = n + 1
          times(n) = min(next_probe, next_output)
