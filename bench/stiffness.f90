@@ -10,13 +10,13 @@ program bench_stiffness
    use, intrinsic :: iso_fortran_env, only: compiler_options
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type
-   use rodyn_case_config, only: case_config, load_config, solver_config
+   use rodyn_case_config, only: case_config, load_config
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_motion, only: motion_type, new_motion, initial_state
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics
    use rodyn_integrators, only: new_integrator
    use rodyn_method_choice, only: method_choice, choose_method
-   use rodyn_method_trial, only: effort_of
+   use rodyn_method_trial, only: candidates, effort_of
    use rodyn_hdf5_files, only: hdf5_file
    implicit none (type, external)
 
@@ -62,6 +62,7 @@ contains
       real(wp), intent(in) :: bending, damper !! factors of EI and D of the article's table 1
       type(case_config) :: config
       type(method_choice) :: choice
+      type(motion_type) :: motion
       type(scene_type) :: scene
       type(error_type), allocatable :: error
       type(run_record) :: one
@@ -73,7 +74,9 @@ contains
 
       call chain(config, n, bending, damper)
       call new_scene(scene, config, error)
+      if (.not. allocated(error)) call new_motion(motion, scene, .false., error)
       if (allocated(error)) error stop error%message
+      call motion%dynamics%set_regime(0.0_wp, t_end)
       call run(config, 'dop853', 1.0e-11_wp, patience_reference, reference, seconds, reached, stats)
       if (reached < t_end) then
          write (*, '(i6, 2es9.1, a)') n, bending, damper, ': no reference'
@@ -83,8 +86,8 @@ contains
          scale_phi = maxval(abs(reference(f + 1:f + n)))
          scale_rate = maxval(abs(reference(a + 1:a + n)))
          do i_tolerance = 1, size(tolerances)
-            call choose_method(choice, solver_config(), options_for(tolerances(i_tolerance)), scene, &
-                               spread(0.0_wp, 1, 2*scene%n_dof), t_end, n_chunks)
+            call choose_method(choice, options_for(tolerances(i_tolerance)), motion, spread(0.0_wp, 1, 2*scene%n_dof), &
+                               0.0_wp, t_end, n_chunks, spread(.false., 1, size(candidates)))
             chosen = choice%method
             if (choice%options%order > 0) write (chosen, '(a, 1x, i0)') choice%method, choice%options%order
             do i_method = 1, size(methods)

@@ -14,6 +14,7 @@ program tester
    use test_kernels, only: collect_kernels
    use test_lanes, only: collect_lanes
    use test_locks, only: collect_locks
+   use test_driver, only: collect_driver
    use test_method_choice, only: collect_method_choice
    use test_held_modes, only: collect_held_modes
    use test_modes, only: collect_modes
@@ -63,6 +64,7 @@ program tester
    call run('gauss', collect_gauss)
    call run('ensemble', collect_ensemble)
    call run('method_choice', collect_method_choice)
+   call run('driver', collect_driver)
    call run('step_limit', collect_step_limit)
    call run('validity', collect_validity)
    call run('progress', collect_progress)

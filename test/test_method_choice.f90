@@ -2,7 +2,7 @@
 module test_method_choice
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
-   use rodyn_case_config, only: case_config, load_config, solver_config
+   use rodyn_case_config, only: case_config, load_config
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_motion, only: motion_type, new_motion
    use rodyn_frequencies, only: natural_frequencies, decay_rates
@@ -159,6 +159,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(case_config) :: config
       type(scene_type) :: scene
+      type(motion_type) :: motion
       type(method_choice) :: choice
       type(solver_options) :: options
       real(wp), allocatable :: y(:), reference(:)
@@ -169,7 +170,11 @@ contains
       call new_scene(scene, config, error)
       if (allocated(error)) return
       options = solver_options(rtol=tolerance, atol=0.01_wp*tolerance)
-      call choose_method(choice, solver_config(), options, scene, spread(0.0_wp, 1, 2*scene%n_dof), record%t_end, 1)
+      call new_motion(motion, scene, .false., error)
+      if (allocated(error)) return
+      call motion%dynamics%set_regime(0.0_wp, record%t_end)
+      call choose_method(choice, options, motion, spread(0.0_wp, 1, 2*scene%n_dof), 0.0_wp, record%t_end, 1, &
+                         spread(.false., 1, size(candidates)))
       call run(scene, choice%method, choice%options, record%t_end, longest_run/(1.0_wp + 0.37_wp*n), y, chosen)
       if (.not. chosen < huge(1.0_wp)) return
       record%scenes = record%scenes + 1

@@ -6,12 +6,10 @@ module rodyn_bench_campaign_runs
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_motion, only: motion_type, new_motion, initial_state, state_invariants
    use rodyn_kinematics, only: invariants_type
-   use rodyn_integrator, only: integrator_type, solver_options, monitor_type
-   use rodyn_integrators, only: new_integrator
-   use rodyn_method_choice, only: method_choice, choose_method
+   use rodyn_integrator, only: solver_options, monitor_type
+   use rodyn_driver, only: driver_type, new_driver
    use rodyn_simulation, only: observer_type, listed_times, simulate
    use rodyn_run, only: options_of
-   use rodyn_step_limit, only: check_fixed_step
    implicit none (type, external)
    private
    public :: run_result, run_campaign_case, empty_case, article_chain
@@ -99,11 +97,10 @@ contains
       type(run_result), intent(out) :: result
       type(scene_type) :: scene
       type(motion_type), target :: motion
-      type(method_choice) :: choice
+      type(driver_type) :: driver
       type(invariant_recorder) :: recorder
       type(budget_monitor), target :: monitor
       type(error_type), allocatable :: error
-      class(integrator_type), allocatable :: integrator
       real(wp) :: total, extent, start, finish
 
       call cpu_time(start)
@@ -116,11 +113,10 @@ contains
          return
       end if
       call initial_state(motion, config%initial, result%y)
-      call choose_method(choice, config%solver, options_of(config), scene, result%y(:motion%n_controlled), &
-                         times(size(times)), size(times))
-      result%method = choice%method
-      call check_fixed_step(choice%method, choice%options, scene, result%y, times(size(times)), error)
-      if (.not. allocated(error)) call new_integrator(integrator, motion, choice%method, choice%options, error)
+      call new_driver(driver, motion, result%y, trim(config%solver%method), options_of(config), times(size(times)), &
+                      size(times), error)
+      if (.not. allocated(error)) call driver%make(error)
+      if (.not. allocated(error)) result%method = driver%choice%method
       if (allocated(error)) then
          result%message = error%message
          return
@@ -128,13 +124,13 @@ contains
       call cpu_time(finish)
       result%seconds_choice = finish - start
       monitor%deadline = finish + budget
-      call integrator%set_monitor(monitor)
+      call driver%set_monitor(monitor)
       allocate (recorder%errors(size(times)), source=0.0_wp)
-      call simulate(motion, integrator, listed_times(times), times(size(times)), recorder, result%y, result%t, error)
+      call simulate(motion, driver, listed_times(times), times(size(times)), recorder, result%y, result%t, error)
       call cpu_time(finish)
       result%seconds = finish - start
-      result%n_steps = integrator%n_steps
-      call integrator%finalize()
+      result%n_steps = driver%n_steps
+      call driver%finalize()
       result%status = 'done'
       if (allocated(error)) then
          result%status = merge('slow  ', 'failed', error%exit_code == exit_stopped)

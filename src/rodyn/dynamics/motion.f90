@@ -169,11 +169,17 @@ contains
       end associate
    end function drive_power
 
-   !> True unless joints of their own stand behind the coordinates, or hinges change their laws at times that are not known
-   !> before. Prestressed hinges, and those that are held until a given time, do not.
+   !> True unless joints of their own stand behind the coordinates, or hinges may change their laws at times that are not known
+   !> before. Prestressed hinges, and those that are held or latched, do not.
    logical function has_lanes(self)
       class(motion_type), intent(in) :: self
-      has_lanes = self%n_q == self%n_dof .and. self%n_events == 0
+      integer :: i
+      has_lanes = self%n_q == self%n_dof
+      do i = 1, self%n_events
+         associate (mechanism => self%dynamics%scene%hinges%mechanisms(self%events%mechanism(i)))
+            has_lanes = has_lanes .and. mechanism%is_constrained()
+         end associate
+      end do
    end function has_lanes
 
    !> p' at several times and states at once.

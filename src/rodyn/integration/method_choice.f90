@@ -9,16 +9,16 @@
 module rodyn_method_choice
    use rodyn_kinds, only: wp
    use rodyn_text, only: to_text, formatted
-   use rodyn_case_config, only: none_given, solver_config
+   use rodyn_motion, only: motion_type
    use rodyn_scene, only: scene_type
    use rodyn_scene_modes, only: most_dof
    use rodyn_fastest_rates, only: fastest_rates, with_rigid_rods
    use rodyn_integrator, only: monitor_type, solver_options, time_text
-   use rodyn_method_trial, only: fast_rates, candidates, n_even, effort_of_nodes, effort_of_modes, effort_of_coupling, &
-      effort_of_output, collocation_step, explicit_step, try_methods
+   use rodyn_method_trial, only: fast_rates, candidates, n_even, effort_of_nodes, effort_of_modes, effort_of_step, &
+      effort_of_coupling, effort_of_output, explicit_step, try_methods
    implicit none (type, external)
    private
-   public :: method_choice, choose_method
+   public :: method_choice, choose_method, named_method
 
    type :: method_choice
       character(len=:), allocatable :: method !! name of an integrator
@@ -26,6 +26,7 @@ module rodyn_method_choice
       logical :: automatic = .false.          !! `auto` chose
       logical :: tried = .false.              !! after a trial
       real(wp) :: effort = 0.0_wp             !! of the trial, in right-hand sides
+      real(wp) :: pace = 0.0_wp               !! of the best even method, expected: time for an effort of 1 [s]
       type(fast_rates) :: rates               !! of the scene
       real(wp) :: steps = 0.0_wp              !! forecast
       real(wp) :: advantage = 1.0_wp          !! over explicit steps, by the trial
@@ -43,49 +44,49 @@ module rodyn_method_choice
 
 contains
 
-   !> The user's method, or the one that fits.
-   subroutine choose_method(choice, solver, options, scene, y, t_end, n_outputs, monitor)
+   !> The method that fits a motion from t on, among those that are not out.
+   subroutine choose_method(choice, options, motion, y, t, t_end, n_outputs, out, monitor)
       type(method_choice), intent(out) :: choice
-      type(solver_config), intent(in) :: solver
       type(solver_options), intent(in) :: options !! of the user
-      type(scene_type), intent(in) :: scene
-      real(wp), intent(in) :: y(:)  !! state at t = 0, without quadratures
-      real(wp), intent(in) :: t_end !! [s]
-      integer, intent(in) :: n_outputs !! states between steps that are wanted
+      type(motion_type), intent(in) :: motion     !! in the regime that begins or goes on at t
+      real(wp), intent(in) :: y(:)     !! state at t, without quadratures
+      real(wp), intent(in) :: t, t_end !! until when it shall serve [s]
+      integer, intent(in) :: n_outputs !! states between steps that are wanted meanwhile
+      logical, intent(in) :: out(size(candidates)) !! methods that are of no use
       class(monitor_type), target, intent(inout), optional :: monitor !! of the run; what is chosen after a stop is of no use
-      real(wp) :: ratio, expected(n_even), forecast(size(candidates)), outputs(size(candidates))
+      real(wp) :: span, ratio, expected(n_even), forecast(size(candidates)), outputs(size(candidates))
+      logical :: available(n_even)
       integer :: best, i
 
-      choice%method = trim(solver%method)
       choice%options = options
-      choice%automatic = solver%method == 'auto'
-      if (.not. choice%automatic) return
+      choice%automatic = .true.
       choice%method = 'dop853'
-      associate (rates => choice%rates)
+      span = t_end - t
+      available = [.not. out(1), .not. out(2) .and. motion%has_lanes()]
+      associate (scene => motion%dynamics%scene, rates => choice%rates)
          call fastest_rates(scene, y(:scene%n_q), rates%frequency, rates%decay)
-         choice%steps = expected_steps('dop853', options, rates, t_end)
-         ! Latching excites all vibrations of the rods, which a trial on the beginning of the run does not see.
-         if (scene%dynamic_bending .and. any(scene%hinges%mechanisms%latch < none_given)) return
+         choice%steps = expected_steps('dop853', options, rates, span)
          ratio = 1.0_wp
          outputs = [(n_outputs*effort_of_output(candidates(i)%method, scene), i=1, size(candidates))]
-         expected = expected_efforts(scene, options, rates, ratio, t_end)
+         expected = expected_efforts(scene, options, rates, ratio, span, available)
          if (minval(expected + outputs(:n_even)) >= short_run) then
             call fastest_rates(with_rigid_rods(scene), y(:scene%n_base + scene%n + scene%n_q - scene%n_dof), rates%slow)
             if (rates%slow > 0.0_wp) ratio = max(rates%frequency, rates%decay)/rates%slow
-            expected = expected_efforts(scene, options, rates, ratio, t_end)
+            expected = expected_efforts(scene, options, rates, ratio, span, available)
          end if
          best = minloc(expected + outputs(:n_even), dim=1)
-         if (expected(best) + outputs(best) < short_run .or. .not. rates%slow > 0.0_wp .or. &
-             ratio*(expected(best) + outputs(best)) < stiff_from(options%rtol, rates)*expected(best)) then
+         if (any(available) .and. (expected(best) + outputs(best) < short_run .or. .not. rates%slow > 0.0_wp .or. &
+             ratio*(expected(best) + outputs(best)) < stiff_from(options%rtol, rates)*expected(best))) then
             expected = expected + outputs(:n_even)
-            if (expected(1)/merge(1.0_wp, even_lead, vibrating(rates, t_end) < 1.0_wp) <= expected(2)) return ! that may be huge
+            if (expected(1)/merge(1.0_wp, even_lead, vibrating(rates, span) < 1.0_wp) <= expected(2)) return ! that may be huge
             choice%method = 'gauss'
-            choice%steps = expected_steps('gauss', options, rates, t_end)
+            choice%steps = expected_steps('gauss', options, rates, span)
             return
          end if
-         call try_methods(scene, y, options, minval([t_end, scene%switches]), t_end, rates, expected, &
-                          vibrating(rates, t_end)*t_end, forecast, choice%effort, monitor)
+         call try_methods(motion, y, t, options, minval([t_end, pack(scene%switches, scene%switches > t)]), t_end, rates, &
+                          expected, vibrating(rates, span)*span, out, forecast, choice%effort, monitor)
       end associate
+      choice%pace = span/minval(forecast(:n_even))
       forecast = forecast + outputs
       forecast(:n_even) = forecast(:n_even)/lead
       best = minloc(forecast, dim=1)
@@ -94,6 +95,15 @@ contains
       choice%options%order = candidates(best)%order
       choice%advantage = min(forecast(1)*lead/forecast(best), 1.0e9_wp)
    end subroutine choose_method
+
+   !> The method that the case names.
+   function named_method(method, options) result(choice)
+      character(len=*), intent(in) :: method
+      type(solver_options), intent(in) :: options
+      type(method_choice) :: choice
+      choice%method = method
+      choice%options = options
+   end function named_method
 
    !> Why this method, in words.
    function reason(self) result(text)
@@ -128,24 +138,25 @@ contains
 
    !> Efforts of explicit steps of order 8 and of collocation, by their steps (docs/performance.md). What the fast vibrations add
    !> to the motion of the chain is nearly linear, so the faster they are, the fewer iterations a step of collocation needs.
-   !> It is out of the question (huge) where it has no lanes or modes, hinges have events, or nothing vibrates.
-   function expected_efforts(scene, options, rates, ratio, t_end) result(effort)
+   !> It is out of the question (huge) where it has no lanes or modes, hinges may have events, or nothing vibrates.
+   function expected_efforts(scene, options, rates, ratio, t_end, available) result(effort)
       type(scene_type), intent(in) :: scene
       type(solver_options), intent(in) :: options
       type(fast_rates), intent(in) :: rates
       real(wp), intent(in) :: ratio !! fastest rate over the frequencies of the chain; 1: unknown, or rods are rigid
-      real(wp), intent(in) :: t_end
+      real(wp), intent(in) :: t_end !! length of the run [s]
+      logical, intent(in) :: available(n_even)
       real(wp) :: effort(n_even)
       real(wp) :: iterations
 
-      effort(1) = explicit_step*expected_steps('dop853', options, rates, t_end)
-      effort(2) = huge(1.0_wp)
-      if (scene%assembled .or. scene%n_q > scene%n_dof .or. scene%n_dof > most_dof .or. size(scene%hinges%mechanisms) > 0) return
+      effort = huge(1.0_wp)
+      if (available(1)) effort(1) = explicit_step*expected_steps('dop853', options, rates, t_end)
+      if (.not. available(2) .or. scene%assembled .or. scene%n_dof > most_dof) return
       if (.not. rates%frequency > 0.0_wp) return
       iterations = 4.5_wp
       if (ratio > 1.0_wp) iterations = max(1.2_wp, 8.0_wp*ratio**(-0.2_wp))
       if (vibrating(rates, t_end) < 1.0_wp) iterations = damped_iterations(rates, options%rtol)
-      effort(2) = (collocation_step + iterations*effort_of_nodes(scene))*expected_steps('gauss', options, rates, t_end)
+      effort(2) = (effort_of_step(scene) + iterations*effort_of_nodes(scene))*expected_steps('gauss', options, rates, t_end)
       if (rates%decay > coupling_decay*rates%frequency) effort(2) = effort(2)*(1.0_wp + effort_of_coupling(scene))
       effort(2) = effort(2) + effort_of_modes(scene, merge(4, 2, vibrating(rates, t_end) < 1.0_wp))
    end function expected_efforts

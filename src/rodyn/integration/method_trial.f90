@@ -5,15 +5,17 @@
 module rodyn_method_trial
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type
+   use rodyn_lane_scene, only: suits_lanes
    use rodyn_lanes, only: lanes
+   use rodyn_locks, only: has_slaves
    use rodyn_scene, only: scene_type
-   use rodyn_motion, only: motion_type, new_motion
+   use rodyn_motion, only: motion_type
    use rodyn_integrator, only: integrator_type, monitor_type, solver_options, solver_statistics
    use rodyn_integrators, only: new_integrator
    implicit none (type, external)
    private
    public :: fast_rates, candidate_type, candidates, n_even, effort_of, effort_of_nodes, effort_of_modes, &
-      effort_of_coupling, effort_of_output, collocation_step, explicit_step, try_methods
+      effort_of_step, effort_of_coupling, effort_of_output, explicit_step, try_methods
 
    !> A method, with the highest order if it is not the usual one.
    type :: candidate_type
@@ -26,7 +28,6 @@ module rodyn_method_trial
       candidate_type('bdf', 0), candidate_type('bdf', 2)]
    integer, parameter :: n_even = 2 !! the first of them follow all vibrations, at a rather even pace; the very first is explicit
 
-   real(wp), parameter :: collocation_step = 4.0_wp   !! effort of a collocation step beside its iterations
    real(wp), parameter :: first_effort = 400.0_wp     !! of a candidate, doubled from round to round; or `first_share` of the run
    real(wp), parameter :: first_share = 0.1_wp
    real(wp), parameter :: even_steps = 200.0_wp       !! are enough to know the pace of methods that follow all vibrations
@@ -63,6 +64,7 @@ module rodyn_method_trial
       class(integrator_type), allocatable :: integrator
       real(wp) :: effort = 0.0_wp  !! spent
       real(wp) :: begun = 0.0_wp   !! of that before the first step
+      real(wp) :: t_start = 0.0_wp !! [s]
       real(wp) :: reached = 0.0_wp !! [s]
       real(wp) :: pace = 0.0_wp    !! simulated time for an effort of 1 in the last round [s]
       real(wp) :: growth = 1.0_wp  !! of the pace, in the last round
@@ -88,43 +90,69 @@ contains
       effort_of = real(stats%n_rhs, wp)
       if (method == 'gauss') effort_of = effort_of_modes(scene, int(stats%n_jac)) + &
                                          (real(stats%n_rhs, wp)/real(lanes, wp)*effort_of_nodes(scene) + &
-                                          collocation_step*real(stats%n_steps, wp)) &
+                                          effort_of_step(scene)*real(stats%n_steps, wp)) &
                                          *(1.0_wp + effort_of_coupling(scene)*stats%n_coupled/max(1.0_wp, real(stats%n_rhs, wp)))
-      if (method == 'bdf') effort_of = 2.1_wp*real(stats%n_rhs, wp) + 3.0_wp*real(stats%n_jac, wp) + &
-                                       real(stats%n_steps, wp)*(2.1_wp + 15.0_wp/(1.0_wp + 0.37_wp*scene%n))
+      if (method == 'bdf') effort_of = 2.1_wp*real(stats%n_rhs, wp) + effort_of_jacobian(scene)*real(stats%n_jac, wp) + &
+                                       real(stats%n_steps, wp)*(2.1_wp + 15.0_wp/(1.0_wp + 0.37_wp*scene%n))/rhs_cost(scene)
    end function effort_of
 
-   !> Effort of one iteration of a collocation step: eight right-hand sides in lanes, and the stiff modes, whose cost grows
-   !> with the square of the number of unknowns (measured from 6 to 195 of them).
+   !> Time of a right-hand side over that of an ordinary chain. Locked hinges and third bending shapes have a recursion of their own
+   !> (measured for chains of 4 to 64 rods that bend, all hinges held: 2.6 to 5.9).
+   pure real(wp) function rhs_cost(scene)
+      type(scene_type), intent(in) :: scene
+      rhs_cost = merge(4.5_wp, 1.0_wp, joins(scene))
+   end function rhs_cost
+
+   !> Locked hinges or third bending shapes?
+   pure logical function joins(scene)
+      type(scene_type), intent(in) :: scene
+      joins = has_slaves(scene) .or. scene%n_bend == 3
+   end function joins
+
+   !> Effort of one iteration of a collocation step: eight right-hand sides, in lanes where they can, and the stiff modes, whose
+   !> cost grows with the square of the number of unknowns (measured from 6 to 195 of them).
    pure real(wp) function effort_of_nodes(scene)
       type(scene_type), intent(in) :: scene
-      effort_of_nodes = 3.4_wp + 0.055_wp*scene%n_dof
+      effort_of_nodes = merge(2.0_wp, real(lanes, wp), suits_lanes(scene)) + (1.4_wp + 0.055_wp*scene%n_dof)/rhs_cost(scene)
    end function effort_of_nodes
+
+   !> Effort of a collocation step beside its iterations.
+   pure real(wp) function effort_of_step(scene)
+      type(scene_type), intent(in) :: scene
+      effort_of_step = 4.0_wp/rhs_cost(scene)
+   end function effort_of_step
 
    !> What coupled modes add to steps and iterations, times these: their equations, and more modes to be found more precisely
    !> (measured for 15, 51 and 195 unknowns: 0.3, 0.8 and 2).
    pure real(wp) function effort_of_coupling(scene)
       type(scene_type), intent(in) :: scene
-      effort_of_coupling = 0.05_wp*real(scene%n_dof, wp)**0.7_wp
+      effort_of_coupling = 0.05_wp*real(scene%n_dof, wp)**0.7_wp/rhs_cost(scene)
    end function effort_of_coupling
 
-   !> Effort of a state between steps: a shorter step, of which collocation knows the first guess; BDF has a polynomial.
+   !> Effort of a Jacobian with its factors: O(n), and dense where hinges are locked or rods have a third bending shape.
+   pure real(wp) function effort_of_jacobian(scene)
+      type(scene_type), intent(in) :: scene
+      effort_of_jacobian = merge(8.0_wp*scene%n, 3.0_wp, joins(scene))
+   end function effort_of_jacobian
+
+   !> Effort of a state between steps: a shorter step, whose first guess collocation knows, so that one or two iterations are
+   !> enough; BDF has a polynomial.
    pure real(wp) function effort_of_output(method, scene)
       character(len=*), intent(in) :: method
       type(scene_type), intent(in) :: scene
       effort_of_output = 11.0_wp
-      if (method == 'gauss') effort_of_output = 1.5_wp*effort_of_nodes(scene) + 0.3_wp*scene%n_dof ! one or two iterations
-      if (method == 'bdf') effort_of_output = 1.5_wp
+      if (method == 'gauss') effort_of_output = 1.5_wp*effort_of_nodes(scene) + 0.3_wp*scene%n_dof/rhs_cost(scene)
+      if (method == 'bdf') effort_of_output = 1.5_wp/rhs_cost(scene)
    end function effort_of_output
 
    !> Effort of finding the modes so many times: the first has no guess.
    pure real(wp) function effort_of_modes(scene, times)
       type(scene_type), intent(in) :: scene
       integer, intent(in) :: times
-      effort_of_modes = 0.4_wp*real(scene%n_dof, wp)**2 + 6.0_wp*scene%n_dof*times
+      effort_of_modes = (0.4_wp*real(scene%n_dof, wp)**2 + 6.0_wp*scene%n_dof*times)/rhs_cost(scene)
    end function effort_of_modes
 
-   !> Effort that each candidate would need from 0 to `t_end`, huge if it fails. An implicit method may creep at first,
+   !> Effort that each candidate would need from `t` to `t_end`, huge if it fails. An implicit method may creep at first,
    !> until vibrations it does not follow have died out. So its pace is that of the last round; that of order 2, which no
    !> vibration holds back for ever, goes on growing until they are calm.
    !>
@@ -132,25 +160,31 @@ contains
    !> and the trial ends when the best has a share of its run behind it. The pace of the even methods is known to a factor of 3
    !> beforehand; only where that leaves a doubt at the end they are tried, too (and collocation from the first where dampers calm
    !> the vibrations).
-   subroutine try_methods(scene, y, options, t_first, t_end, rates, expected, t_quiet, forecast, effort, monitor)
-      type(scene_type), intent(in) :: scene
-      real(wp), intent(in) :: y(:)                  !! state at t = 0, without quadratures
+   subroutine try_methods(motion, y, t, options, t_first, t_end, rates, expected, quiet_after, out, forecast, effort, monitor)
+      type(motion_type), intent(in) :: motion       !! in the regime that begins or goes on at t
+      real(wp), intent(in) :: y(:)                  !! state at t, without quadratures
+      real(wp), intent(in) :: t                     !! [s]
       type(solver_options), intent(in) :: options
       real(wp), intent(in) :: t_first               !! end of the trial at the latest; no load switches before [s]
       real(wp), intent(in) :: t_end                 !! [s]
       type(fast_rates), intent(in) :: rates
       real(wp), intent(in) :: expected(n_even)      !! effort of the even methods; huge: of no use here
-      real(wp), intent(in) :: t_quiet               !! when dampers will have calmed the fastest vibrations [s]
+      real(wp), intent(in) :: quiet_after           !! time in which dampers will have calmed the fastest vibrations [s]
+      logical, intent(in) :: out(size(candidates))  !! those of no use
       real(wp), intent(out) :: forecast(size(candidates))
       real(wp), intent(out) :: effort               !! spent on the trial
       class(monitor_type), target, intent(inout), optional :: monitor !! may end the trial, which then tells nothing
       type(trial_monitor), target :: listener
       type(runner) :: runners(size(candidates))
-      real(wp) :: first, allowed
+      real(wp) :: first, allowed, t_quiet
       integer :: i, best
       logical :: over, even_tried
 
       if (present(monitor)) listener%outer => monitor
+      t_quiet = t + quiet_after
+      runners%t_start = t
+      runners%reached = t
+      runners%failed = out
       forecast(:n_even) = expected
       forecast(n_even + 1:) = huge(1.0_wp)
       first = min(first_effort, first_share*minval(expected))
@@ -160,7 +194,7 @@ contains
          call follow_collocation()
          do i = n_even + 1, size(candidates)
             if (outdone(i)) cycle
-            call continue_runner(runners(i), candidates(i), scene, y, options, t_first, allowed, listener)
+            call continue_runner(runners(i), candidates(i), motion, y, options, t_first, allowed, listener)
             forecast(i) = forecast_of(runners(i), t_end, candidates(i)%order == 2 .and. allowed > 3.0_wp*first)
             if (candidates(i)%order == 2 .and. grows_for_good(runners(i), rates)) &
                forecast(i) = min(forecast_of(runners(i), t_end, .false.), &
@@ -189,17 +223,17 @@ contains
       !> counts once they are calm; before, it is the least to be expected.
       subroutine follow_collocation()
          if (.not. expected(2) < huge(1.0_wp)) return
-         if (.not. t_quiet < t_end .or. runners(2)%failed .or. effort_of_modes(scene, 2) > allowed) return
+         if (.not. t_quiet < t_end .or. runners(2)%failed .or. effort_of_modes(motion%dynamics%scene, 2) > allowed) return
          if (expected(2)/expectation_error > minval(forecast(n_even + 1:))) return
-         call continue_runner(runners(2), candidates(2), scene, y, options, t_first, allowed, listener)
+         call continue_runner(runners(2), candidates(2), motion, y, options, t_first, allowed, listener)
          forecast(2) = forecast_of(runners(2), t_end, .false.)
-         if (runners(2)%reached < 3.0_wp*t_quiet .and. .not. runners(2)%failed) forecast(2) = min(forecast(2), expected(2))
+         if (runners(2)%reached - t < 3.0_wp*quiet_after .and. .not. runners(2)%failed) forecast(2) = min(forecast(2), expected(2))
       end subroutine follow_collocation
 
       !> Whether the trial has had its share of the run. One that may still become unstable has to show its whole run.
       logical function is_spent()
          real(wp) :: budget, share
-         budget = min(most_effort(scene), even_share*minval(forecast(:n_even)))
+         budget = min(most_effort(motion%dynamics%scene), even_share*minval(forecast(:n_even)))
          share = own_share
          if (candidates(best)%order == 2 .and. runners(best)%growth > 1.4_wp) share = growing_share
          if (forecast(best) < minval(forecast(:n_even)) .and. .not. order_is_risky(best)) budget = min(budget, share*forecast(best))
@@ -218,13 +252,13 @@ contains
             a_step = explicit_step
             start = 0.0_wp
             if (candidates(j)%method == 'gauss') then
-               a_step = collocation_step + 2.0_wp*effort_of_nodes(scene)
-               start = effort_of_modes(scene, 2)
+               a_step = effort_of_step(motion%dynamics%scene) + 2.0_wp*effort_of_nodes(motion%dynamics%scene)
+               start = effort_of_modes(motion%dynamics%scene, 2)
             end if
             if (start > 2.0_wp*even_trial*expected(j)) cycle
             most = min(even_steps*a_step, even_trial*expected(j))
-            call continue_runner(runners(j), candidates(j), scene, y, options, t_first, 0.4_wp*most, listener)
-            call continue_runner(runners(j), candidates(j), scene, y, options, t_first, most, listener)
+            call continue_runner(runners(j), candidates(j), motion, y, options, t_first, 0.4_wp*most, listener)
+            call continue_runner(runners(j), candidates(j), motion, y, options, t_first, most, listener)
             forecast(j) = forecast_of(runners(j), t_end, .false.)
             ! Explicit steps bound by dampers cost what is known beforehand, once the first vibrations have died out.
             if (j == 1 .and. rates%decay > rates%frequency .and. .not. runners(j)%failed) &
@@ -232,7 +266,8 @@ contains
          end do
          if (.not. t_quiet < t_end) return
          do j = 1, n_even ! what was seen of these two are vibrations that dampers will calm: the rest is not dearer than expected
-            if (runners(j)%reached < 3.0_wp*t_quiet .and. .not. runners(j)%failed) forecast(j) = min(forecast(j), expected(j))
+            if (runners(j)%reached - t < 3.0_wp*quiet_after .and. .not. runners(j)%failed) &
+               forecast(j) = min(forecast(j), expected(j))
          end do
       end subroutine try_even
 
@@ -353,43 +388,39 @@ contains
       quiet = 11.0_wp*(1.0e-3_wp/rtol)**(1.0_wp/3.0_wp)*rates%slow*(t_end - self%reached)*per_step(self)
    end function quiet
 
-   subroutine start_runner(self, candidate, scene, y, options, t_end, listener)
+   !> With a copy of the motion as it stands, but for the ledger and the record of events.
+   subroutine start_runner(self, candidate, motion, y, options, t_end, listener)
       type(runner), intent(inout) :: self
       type(candidate_type), intent(in) :: candidate
-      type(scene_type), intent(in) :: scene
+      type(motion_type), intent(in) :: motion
       real(wp), intent(in) :: y(:)
       type(solver_options), intent(in) :: options
       real(wp), intent(in) :: t_end
       type(trial_monitor), target, intent(inout) :: listener
       type(solver_options) :: own
       type(error_type), allocatable :: error
-      real(wp) :: begin(size(y))
 
       own = options
       own%order = candidate%order
-      if (candidate%method == 'bdf') own%fixed_step = 0.0_wp
       allocate (self%motion)
-      call new_motion(self%motion, scene, .false., error)
-      if (.not. allocated(error)) then
-         begin = y
-         call self%motion%begin_regime(0.0_wp, t_end, t_end, begin, error)
-      end if
-      if (.not. allocated(error)) then
-         call new_integrator(self%integrator, self%motion, trim(candidate%method), own, error)
-      end if
+      self%motion = motion
+      self%motion%ledger = .false.
+      self%motion%n_states = motion%n_controlled
+      self%motion%events%n_logged = 0
+      call new_integrator(self%integrator, self%motion, trim(candidate%method), own, error)
       if (.not. allocated(error)) then
          if (associated(listener%outer)) call self%integrator%set_monitor(listener)
          call self%integrator%set_stop(t_end)
-         call self%integrator%start(0.0_wp, y, error)
+         call self%integrator%start(self%t_start, y, error)
       end if
       self%failed = allocated(error)
    end subroutine start_runner
 
    !> Go on until the effort is spent, or the end or a failure is met.
-   subroutine continue_runner(self, candidate, scene, y, options, t_end, allowed, listener)
+   subroutine continue_runner(self, candidate, motion, y, options, t_end, allowed, listener)
       type(runner), intent(inout) :: self
       type(candidate_type), intent(in) :: candidate
-      type(scene_type), intent(in) :: scene
+      type(motion_type), intent(in) :: motion
       type(solver_options), intent(in) :: options
       real(wp), intent(in) :: y(:), t_end, allowed
       type(trial_monitor), target, intent(inout) :: listener
@@ -400,8 +431,8 @@ contains
       integer :: steps
 
       if (.not. associated(self%motion)) then
-         call start_runner(self, candidate, scene, y, options, t_end, listener)
-         if (.not. self%failed) self%begun = effort_of(candidate%method, scene, self%integrator%statistics())
+         call start_runner(self, candidate, motion, y, options, t_end, listener)
+         if (.not. self%failed) self%begun = effort_of(candidate%method, motion%dynamics%scene, self%integrator%statistics())
          self%effort = self%begun
       end if
       effort_before = self%effort
@@ -413,7 +444,7 @@ contains
          self%integrator%options%max_steps = int(stats%n_steps) + steps
          call self%integrator%advance(t_end, state, self%reached, error)
          stats = self%integrator%statistics()
-         self%effort = effort_of(candidate%method, scene, stats)
+         self%effort = effort_of(candidate%method, motion%dynamics%scene, stats)
          if (.not. allocated(error) .and. self%integrator%at_event) call pass_event(self, state, error)
          self%failed = allocated(error) .and. self%reached < t_end .and. stats%n_steps < self%integrator%options%max_steps
       end do

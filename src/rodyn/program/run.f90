@@ -9,10 +9,10 @@ module rodyn_run
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_motion, only: motion_type, new_motion, initial_state, state_invariants
    use rodyn_kinematics, only: invariants_type
-   use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, time_text
-   use rodyn_integrators, only: new_integrator, sundials_version
+   use rodyn_integrator, only: solver_options, solver_statistics, time_text
+   use rodyn_integrators, only: sundials_version
    use rodyn_lapack, only: use_one_thread
-   use rodyn_method_choice, only: method_choice, choose_method
+   use rodyn_driver, only: driver_type, new_driver
    use rodyn_simulation, only: observer_type, even_times, simulate
    use rodyn_ledger, only: fill_row
    use rodyn_run_needs, only: check_needs
@@ -58,9 +58,8 @@ contains
       type(scene_type) :: scene
       type(motion_type), target :: motion
       type(recorder_type) :: recorder
-      type(method_choice) :: choice
+      type(driver_type) :: driver
       type(run_header) :: header
-      class(integrator_type), allocatable :: integrator
       type(progress_monitor), target :: progress
       real(wp), allocatable :: y(:)
       type(error_type), allocatable :: failure
@@ -85,18 +84,17 @@ contains
       motion%events%most = config%solver%max_events
       call initial_state(motion, config%initial, y)
       progress = new_progress(0.0_wp, config%t_end, silent)
-      call choose_method(choice, config%solver, options_of(config), scene, y(:motion%n_controlled), config%t_end, &
-                         config%n_outputs, progress)
-      call check_fixed_step(choice%method, choice%options, scene, y, config%t_end, error)
+      call new_driver(driver, motion, y, trim(config%solver%method), options_of(config), config%t_end, config%n_outputs, error, &
+                      progress)
       if (allocated(error) .and. present(name)) error%message = name//': '//error%message
       if (allocated(error)) return
       header%notes = notes_on(scene, y(:scene%n_dof), config%output%ledger)
       if (.not. silent) then
          write (output_unit, '(a)') describe_scene(scene, config%output%ledger)
-         write (output_unit, '(a)') 'method  '//choice%method//': '//choice%reason()
+         write (output_unit, '(a)') 'method  '//driver%methods()//': '//driver%reason()
          call print_lines('note   ', header%notes)
       end if
-      call new_integrator(integrator, motion, choice%method, choice%options, error)
+      call driver%make(error)
       if (allocated(error)) return
 
       header%title = config%title
@@ -113,8 +111,7 @@ contains
       if (allocated(error)) return
       recorder%row = new_run_row(scene%n)
       recorder%validity = new_validity(scene, config%model%deflection_limit)
-      call integrator%set_monitor(progress)
-      call simulate(motion, integrator, even_times(config%t_end, config%n_outputs), config%t_end, recorder, y, t, failure)
+      call simulate(motion, driver, even_times(config%t_end, config%n_outputs), config%t_end, recorder, y, t, failure)
       call progress%finish()
       call system_clock(clock_end)
       written = path
@@ -124,13 +121,13 @@ contains
       if (written /= path) call recorder%file%redirect(written)
       if (motion%events%watches) call write_events(recorder%file, motion, error)
       if (.not. allocated(error)) &
-         call close_file(recorder, integrator, choice, config, scene, failure, &
+         call close_file(recorder, driver, config, scene, failure, &
                       real(clock_end - clock_start, wp)/real(clock_rate, wp), error)
       if (.not. silent .and. .not. allocated(error)) call print_events(motion)
       if (.not. silent .and. .not. allocated(error)) &
-         call print_result(integrator, recorder, written, config, t, &
+         call print_result(driver, recorder, written, config, t, &
                            real(clock_end - clock_start, wp)/real(clock_rate, wp), failure)
-      call integrator%finalize()
+      call driver%finalize()
       if (allocated(error)) return
       if (allocated(failure)) then
          failure%message = failure%message//' (rows until then are in '//written//')'
@@ -192,10 +189,9 @@ contains
    end function options_of
 
    !> Attributes of the solver, status, and the final name.
-   subroutine close_file(recorder, integrator, choice, config, scene, failure, seconds, error)
+   subroutine close_file(recorder, driver, config, scene, failure, seconds, error)
       type(recorder_type), intent(inout) :: recorder
-      class(integrator_type), intent(inout) :: integrator
-      type(method_choice), intent(in) :: choice
+      type(driver_type), intent(inout) :: driver
       type(case_config), intent(in) :: config
       type(scene_type), intent(in) :: scene
       type(error_type), allocatable, intent(in) :: failure
@@ -204,9 +200,9 @@ contains
       type(solver_statistics) :: stats
       type(solver_report) :: report
 
-      stats = integrator%statistics()
-      report%method = choice%method
-      report%reason = choice%reason()
+      stats = driver%statistics()
+      report%method = driver%methods()
+      report%reason = driver%reason()
       report%kernel = trim(merge('assembled', 'recursive', scene%assembled))
       report%order = config%solver%order
       report%rtol = config%solver%rtol
@@ -272,8 +268,8 @@ contains
    end subroutine print_lines
 
    !> Last lines on the terminal.
-   subroutine print_result(integrator, recorder, path, config, t, seconds, failure)
-      class(integrator_type), intent(inout) :: integrator
+   subroutine print_result(driver, recorder, path, config, t, seconds, failure)
+      type(driver_type), intent(inout) :: driver
       type(recorder_type), intent(in) :: recorder
       character(len=*), intent(in) :: path
       type(case_config), intent(in) :: config
@@ -282,11 +278,12 @@ contains
       type(solver_statistics) :: stats
       character(len=8) :: outcome
 
-      stats = integrator%statistics()
+      stats = driver%statistics()
       outcome = 'done'
       if (allocated(failure)) outcome = merge('stopped', 'failed ', failure%exit_code == exit_stopped)
       write (output_unit, '(a, i0, a, i0, a)') outcome//'t = '//time_text(t)//' s, ', stats%n_steps, ' steps, ', &
          stats%n_rhs, ' right-hand sides, '//formatted(seconds, '(f20.3)')//' s'
+      call print_lines('method ', driver%history)
       if (config%output%ledger) write (output_unit, '(a, es8.1, a, es8.1, a)') 'ledger  largest energy residual ', &
          recorder%worst_residual, ' J of ', recorder%energy_scale, ' J'
       call print_lines('warning', recorder%validity%warnings())

@@ -7,11 +7,10 @@ module rodyn_sweep_case
    use rodyn_case_config, only: case_config
    use rodyn_case_reader, only: case_from_document
    use rodyn_errors, only: error_type, raise, exit_stopped
-   use rodyn_integrator, only: integrator_type, monitor_type, solver_statistics
-   use rodyn_integrators, only: new_integrator
+   use rodyn_driver, only: driver_type, new_driver
+   use rodyn_integrator, only: monitor_type, solver_statistics
    use rodyn_ledger, only: fill_row
    use rodyn_linear_model, only: linear_model
-   use rodyn_method_choice, only: method_choice, choose_method
    use rodyn_modal_analysis, only: modes_at_start
    use rodyn_modes, only: mode_set
    use rodyn_motion, only: motion_type, new_motion, initial_state
@@ -24,7 +23,6 @@ module rodyn_sweep_case
    use rodyn_switch_times, only: same_time
    use rodyn_simulation, only: observer_type, listed_times, simulate
    use rodyn_sweep_config, only: sweep_config, is_ratio, value_text
-   use rodyn_step_limit, only: check_fixed_step
    use rodyn_sweep_plan, only: sweep_plan
    use rodyn_validity, only: validity_type, new_validity
    use rodyn_text, only: short_text
@@ -247,19 +245,19 @@ contains
    end subroutine make_nan
 
    !> Everything about a case that comes before its integration, frequencies among it. `keeper%kept` is the caller's to set.
-   subroutine prepare_case(sweep, plan, shape, case, pulse, clock_start, motion, y, times, t_end, keeper, choice, late, error)
+   subroutine prepare_case(sweep, plan, shape, case, pulse, clock_start, motion, y, times, t_end, keeper, driver, late, error)
       type(sweep_config), intent(in) :: sweep
       type(sweep_plan), intent(in) :: plan
       type(case_shape), intent(in) :: shape
       integer, intent(in) :: case
       class(pulse_type), target, intent(inout) :: pulse
       integer(i8), intent(in) :: clock_start         !! when work on the case began [counts]
-      type(motion_type), intent(inout) :: motion
+      type(motion_type), target, intent(inout) :: motion !! must outlive the driver
       real(wp), allocatable, intent(out) :: y(:)     !! state at t = 0
       real(wp), allocatable, intent(out) :: times(:) !! at which the keeper wants to see it [s]
       real(wp), intent(out) :: t_end                 !! [s]
       type(keeper_type), intent(inout) :: keeper
-      type(method_choice), intent(out) :: choice
+      type(driver_type), intent(out) :: driver       !! without a monitor
       logical, target, intent(out) :: late           !! the choice of the method alone took longer than the case may
       type(error_type), allocatable, intent(out) :: error
       type(case_config) :: config
@@ -279,13 +277,13 @@ contains
       call initial_state(motion, config%initial, y)
       monitor = new_monitor(sweep, pulse, clock_start, late)
       call merge_times(config, sweep%probe_times, shape%outputs, times, keeper%probe_of, keeper%output_of)
-      call choose_method(choice, config%solver, options_of(config), scene, y, t_end, size(times), monitor)
-      if (choice%tried) then
+      call new_driver(driver, motion, y, trim(config%solver%method), options_of(config), t_end, size(times), error, monitor)
+      nullify (driver%monitor)
+      if (allocated(error)) return
+      if (driver%choice%tried) then
          if (monitor%stop_requested()) call raise(error, 'stopped on request at t = 0 s', exit_stopped)
          if (allocated(error)) return
       end if
-      call check_fixed_step(choice%method, choice%options, scene, y, t_end, error)
-      if (allocated(error)) return
       keeper%row = new_run_row(scene%n)
       keeper%validity = new_validity(scene, config%model%deflection_limit)
       keeper%n_rods = shape%n_rods
@@ -319,9 +317,9 @@ contains
    end subroutine keep_frequencies
 
    !> Integrate a prepared case by itself, and keep what is wanted.
-   subroutine integrate_case(sweep, choice, times, t_end, pulse, clock_start, motion, y, keeper, late, error)
+   subroutine integrate_case(sweep, driver, times, t_end, pulse, clock_start, motion, y, keeper, late, error)
       type(sweep_config), intent(in) :: sweep
-      type(method_choice), intent(in) :: choice
+      type(driver_type), intent(inout) :: driver !! for this motion
       real(wp), intent(in) :: times(:), t_end   !! [s]
       class(pulse_type), target, intent(inout) :: pulse
       integer(i8), intent(in) :: clock_start    !! when work on the case began [counts]
@@ -332,23 +330,22 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(case_monitor), target :: monitor
       type(solver_statistics) :: stats
-      class(integrator_type), allocatable :: integrator
       integer(i8) :: clock_a, clock_b, clock_rate
 
       late = .false.
-      call new_integrator(integrator, motion, choice%method, choice%options, error)
-      if (allocated(error)) return
       monitor = new_monitor(sweep, pulse, clock_start, late)
-      call integrator%set_monitor(monitor)
+      call driver%set_monitor(monitor)
       call system_clock(clock_a, clock_rate)
-      call simulate(motion, integrator, listed_times(times), t_end, keeper, y, keeper%kept%t_reached, error)
+      call simulate(motion, driver, listed_times(times), t_end, keeper, y, keeper%kept%t_reached, error)
       call system_clock(clock_b)
       keeper%kept%integration_seconds = real(clock_b - clock_a, wp)/real(clock_rate, wp)
-      stats = integrator%statistics()
+      stats = driver%statistics()
       keeper%kept%n_steps = stats%n_steps
       keeper%kept%n_rhs = stats%n_rhs
-      call integrator%finalize()
       if (.not. allocated(error)) call keep_final(motion, t_end, y, keeper, error)
+      if (.not. allocated(error) .and. len(driver%failures) > 0) keeper%kept%message = &
+         in_one_line(joined(driver%failures, keeper%kept%message))
+      call driver%finalize()
    end subroutine integrate_case
 
    !> Keep the state at the end of a case.
@@ -367,6 +364,14 @@ contains
       keeper%kept%message = in_one_line(keeper%validity%warnings())
       call place(keeper%row, keeper%n_rods, keeper%kept%final)
    end subroutine keep_final
+
+   !> Two texts, each of which may be empty.
+   pure function joined(a, b) result(text)
+      character(len=*), intent(in) :: a, b
+      character(len=:), allocatable :: text
+      text = a//b
+      if (len(a) > 0 .and. len(b) > 0) text = a//'; '//b
+   end function joined
 
    !> A message has no line ends.
    pure function in_one_line(lines) result(text)

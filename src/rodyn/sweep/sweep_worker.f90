@@ -9,7 +9,7 @@ module rodyn_sweep_worker
    use rodyn_lane_dop853, only: suits_lane_dop853
    use rodyn_lane_scene, only: are_alike, suits_lanes
    use rodyn_lanes, only: lanes
-   use rodyn_method_choice, only: method_choice
+   use rodyn_driver, only: driver_type
    use rodyn_scene, only: scene_type
    use rodyn_sweep_case, only: case_result, case_shape, clear_result, conclude_case, integrate_case, keep_final, keeper_type, &
       prepare_case, pulse_type
@@ -56,7 +56,7 @@ module rodyn_sweep_worker
       integer :: ticket = 0
       type(case_result) :: kept
       type(keeper_type) :: keeper
-      type(method_choice) :: choice
+      type(driver_type) :: driver
       real(wp) :: preparation = 0.0_wp !! wall time before the integration [s]
    end type lane_case
 
@@ -204,16 +204,16 @@ contains
       call clear_result(new%kept, self%shape, case)
       new%keeper%kept => new%kept
       call prepare_case(self%sweep, self%plan, self%shape, case, self%feed, clock_start, new%motion, new%y, new%times, &
-                        new%t_end, new%keeper, new%choice, late, error)
+                        new%t_end, new%keeper, new%driver, late, error)
       if (.not. allocated(error) .and. self%sweep%integrate) then
-         new%options = new%choice%options
+         new%options = new%driver%choice%options
          new%limit = self%sweep%case_seconds
          if (self%in_lanes .and. goes_in_lane(new)) then
             call system_clock(clock_end)
             new%preparation = real(clock_end - clock_start, wp)/real(rate, wp)
             return
          end if
-         call integrate_case(self%sweep, new%choice, new%times, new%t_end, self%feed, clock_start, new%motion, new%y, &
+         call integrate_case(self%sweep, new%driver, new%times, new%t_end, self%feed, clock_start, new%motion, new%y, &
                              new%keeper, late, error)
       end if
       call system_clock(clock_end)
@@ -226,7 +226,7 @@ contains
    pure logical function goes_in_lane(case)
       type(lane_case), intent(in) :: case
       goes_in_lane = .false.
-      if (case%choice%method == 'dop853' .and. suits_lane_dop853(case%choice%options)) &
+      if (case%driver%choice%method == 'dop853' .and. suits_lane_dop853(case%driver%choice%options)) &
          goes_in_lane = suits_lanes(case%motion%dynamics%scene)
    end function goes_in_lane
 
