@@ -6,6 +6,7 @@ program tester
    use test_case_reader, only: collect_case_reader
    use test_case_rules, only: collect_case_rules
    use test_gauss, only: collect_gauss
+   use test_balance, only: collect_balance
    use test_beams, only: collect_beams
    use test_invariants, only: collect_invariants
    use test_ensemble, only: collect_ensemble
@@ -59,6 +60,7 @@ program tester
    call run('held_modes', collect_held_modes)
    call run('moving', collect_moving)
    call run('switches', collect_switches)
+   call run('balance', collect_balance)
    call run('newton', collect_newton)
    call run('integrators', collect_integrators)
    call run('gauss', collect_gauss)

@@ -72,12 +72,13 @@ contains
       dynamics%scene = scene
       call new_workspace(dynamics%work, scene)
       allocate (dynamics%forces%node(2, 0))
+      allocate (dynamics%opening_acceleration(0:scene%n - 1), source=0.0_wp)
       if (scene%hinges%driven) then
          allocate (dynamics%kink(0:scene%n - 1), dynamics%kink_rate(0:scene%n - 1), dynamics%kink_acceleration(0:scene%n - 1), &
                    source=0.0_wp)
-         call new_kink_regime(dynamics%kinks, scene%kinks, 0.0_wp, 0.0_wp)
+         call new_kink_regime(dynamics%kinks, scene%kinks, 0.0_wp, 4.0_wp*tiny(1.0_wp)) ! as they are when the run begins
+         call dynamics%move_kinks(0.0_wp)
       end if
-      allocate (dynamics%opening_acceleration(0:scene%n - 1), source=0.0_wp)
       call choose_path(dynamics, error)
    end subroutine new_dynamics
 

@@ -7,7 +7,8 @@ module rodyn_kinematics
    use rodyn_three_moments, only: slopes_from_moments
    implicit none (type, external)
    private
-   public :: invariants_type, invariants, load_power, damper_power, dissipated_power, slopes, kinetic_energy
+   public :: invariants_type, invariants, load_power, damper_power, dissipated_power, slopes, kinetic_energy, &
+      elastic_energy
 
    !> What the ledger records of a state. Momenta along inertial axes, angular momentum about their origin.
    type :: invariants_type

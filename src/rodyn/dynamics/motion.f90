@@ -258,7 +258,6 @@ contains
       real(wp), contiguous, intent(inout) :: y(:)
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: lost, before
-      integer :: n_before
 
       associate (hinges => self%dynamics%scene%hinges, r => self%n_q, m => self%n_dof)
          if (.not. (hinges%driven .or. self%events%watches)) then
@@ -268,16 +267,14 @@ contains
          if (t > 0.0_wp) then
             call self%dynamics%move_kinks(t)
             lost = 0.0_wp
-            before = energy_of(self, y)
-            n_before = self%events%n_logged
             if (self%events%watches) call self%events%release_due(self%dynamics, t, y(1:r), y(r + 1:r + m), lost, error)
-            if (self%events%n_logged > n_before) call book_loss(self, before, lost, y)
-            ! A kink that jumps works on the springs, which may change their laws.
+            call book(self, 0.0_wp, lost, y)
+            ! A kink that jumps works on the springs, which may change their laws; what is lost meanwhile it has done as well.
             lost = 0.0_wp
             before = energy_of(self, y)
             call self%dynamics%set_regime(t, t_to)
-            if (self%events%watches) call self%events%settle(self%dynamics, t, y(1:r), y(r + 1:r + m), lost, error)
-            if (self%ledger) y(r + m + 1:r + m + 2) = y(r + m + 1:r + m + 2) + [(energy_of(self, y) - before) + lost, lost]
+            if (self%events%watches) call self%events%follow(self%dynamics, t, y(1:r), y(r + 1:r + m), lost, error)
+            call book(self, merge((energy_of(self, y) - before) + lost, 0.0_wp, hinges%driven), lost, y)
          else
             call self%dynamics%set_regime(t, t_to)
             self%events%span = t_end
@@ -296,24 +293,15 @@ contains
       energy_of = values%kinetic + values%elastic
    end function energy_of
 
-   !> Put the loss of events into the ledger. Between massless rods that bend, joints jump when a lock opens; what
-   !> that costs belongs to the last event.
-   subroutine book_loss(self, before, lost, y)
-      type(motion_type), intent(inout) :: self
-      real(wp), intent(in) :: before !! kinetic and elastic energy [J]
-      real(wp), intent(in) :: lost   !! known so far [J]
+   !> Put work that was done and energy that was lost in no time into the ledger.
+   subroutine book(self, work, lost, y)
+      type(motion_type), intent(in) :: self
+      real(wp), intent(in) :: work, lost !! [J]
       real(wp), contiguous, intent(inout) :: y(:)
-      real(wp) :: in_jump
-
-      in_jump = 0.0_wp
-      if (self%dynamics%scene%quasistatic) then
-         in_jump = (before - energy_of(self, y)) - lost
-         associate (event => self%events%log(self%events%n_logged))
-            event%energy_lost = event%energy_lost + in_jump
-         end associate
-      end if
-      if (self%ledger) y(self%n_q + self%n_dof + 2) = y(self%n_q + self%n_dof + 2) + (lost + in_jump)
-   end subroutine book_loss
+      associate (last => self%n_q + self%n_dof)
+         if (self%ledger) y(last + 1:last + 2) = y(last + 1:last + 2) + [work, lost]
+      end associate
+   end subroutine book
 
    !> Change what an event changes: laws of hinges, and rates where one becomes a constraint.
    subroutine respond(self, t, crossed, y, error)
@@ -322,16 +310,14 @@ contains
       logical, intent(in) :: crossed(:)  !! event functions that became negative
       real(wp), contiguous, intent(inout) :: y(:)
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: lost, before, worked
+      real(wp) :: lost, worked
 
       call self%dynamics%move_kinks(t)
-      before = energy_of(self, y)
       worked = self%events%worked
       associate (r => self%n_q, m => self%n_dof)
          call self%events%respond(self%dynamics, t, y(1:r), y(r + 1:r + m), crossed, lost, error)
-         if (self%ledger) y(r + m + 1) = y(r + m + 1) + (self%events%worked - worked)
       end associate
-      call book_loss(self, before, lost, y)
+      call book(self, self%events%worked - worked, lost, y)
       call forget_hinges(self)
    end subroutine respond
 

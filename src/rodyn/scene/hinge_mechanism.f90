@@ -9,7 +9,8 @@
 !>   d_face = d0 exp(-Cs (t - t0)/Ds), and may be met again;
 !> - dry friction F, regularised: F th'/vf while |th'| < vf (sticks), F sign(th') beyond (slides);
 !> - a lock: th stays (a constraint), or a spring and damper about the angle where it locked.
-!> What is left in a stop's face or a lock's spring when it is left is lost, and booked at that event.
+!> What is left in a stop's face or a lock's spring when it is left is lost, and booked at that event. A hinge that is held
+!> waits for its release; one that has latched is locked for good.
 !>
 !> Each law holds while its margins are positive; an event is a margin that has become negative. A hinge changes its law
 !> only `hysteresis` beyond the point where two laws meet, so that rounding cannot make it change back at once.
@@ -19,11 +20,11 @@ module rodyn_hinge_mechanism
    implicit none (type, external)
    private
    public :: hinge_mechanism, new_mechanism
-   public :: part_spring, part_lower, part_upper, part_friction, part_latch, n_parts
+   public :: part_spring, part_lower, part_upper, part_friction, part_latch
    public :: kind_names, kind_released, kind_latched
 
    !> Parts of a mechanism that have a margin.
-   integer, parameter :: part_spring = 1, part_lower = 2, part_upper = 3, part_friction = 4, part_latch = 5, n_parts = 5
+   integer, parameter :: part_spring = 1, part_lower = 2, part_upper = 3, part_friction = 4, part_latch = 5
 
    !> Kinds of events.
    integer, parameter :: kind_released = 1, kind_latched = 2, kind_in_freeplay = 3, kind_out_of_freeplay = 4, &
@@ -49,7 +50,7 @@ module rodyn_hinge_mechanism
       real(wp) :: latch = none_given        !! [rad]
       real(wp) :: lock_stiffness = 0.0_wp   !! 0: a constraint [N m/rad]
       real(wp) :: lock_damping = 0.0_wp     !! [N m s/rad]
-      logical :: held = .false.             !! locked at the start
+      logical :: held = .false.             !! locked from the start, until its release
       real(wp) :: release_time = none_given !! [s]
       integer :: release_after = -1
       logical :: dampers_apart = .false.    !! dampers bend no rods (reduced dampers): stops are left at their angle
@@ -58,15 +59,19 @@ module rodyn_hinge_mechanism
       real(wp) :: face(2) = 0.0_wp          !! depth of a stop's face where it was left [rad]
       real(wp) :: left(2) = 0.0_wp          !! when [s]
       integer :: slides = 0                 !! 0: sticks; else the sign of th'
-      logical :: locked = .false.
+      logical :: locked = .false.           !! held or latched
+      logical :: latched = .false.          !! for good
       real(wp) :: lock_angle = 0.0_wp       !! [rad]
-      integer :: latch_side = 0             !! sign of the way to the latch; 0: none, or latched
+      integer :: latch_side = 0             !! sign of the way to the latch; 0: there is none
    contains
       procedure :: settle
       procedure :: margin
       procedure :: change
       procedure :: lock
+      procedure :: face_latch
+      procedure :: snap
       procedure :: release
+      procedure :: list_events
       procedure :: linear_law
       procedure :: energy
       procedure :: is_constrained
@@ -103,7 +108,7 @@ contains
       self%side = merge(0, 1, given%freeplay > 0.0_wp)
    end subroutine new_mechanism
 
-   !> Choose the laws that hold at a state: at the start, and after a jump of it.
+   !> Choose the laws that hold at a state to which no motion led. A stop that is left too fast to follow keeps its face there.
    pure subroutine settle(self, theta, theta_rate)
       class(hinge_mechanism), intent(inout) :: self
       real(wp), intent(in) :: theta, theta_rate !! th [rad], th' [rad/s]
@@ -115,7 +120,8 @@ contains
       end if
       do i = 1, 2
          self%touches(i) = depth(self, i, theta) > 0.0_wp .and. push(self, i, theta, theta_rate) > 0.0_wp
-         self%face(i) = 0.0_wp
+         self%face(i) = merge(0.0_wp, max(depth(self, i, theta), 0.0_wp), self%touches(i))
+         self%left(i) = 0.0_wp
       end do
       if (self%friction > 0.0_wp) then
          self%slides = 0
@@ -182,7 +188,7 @@ contains
             margin = self%slides*theta_rate - self%friction_velocity
          end if
       case (part_latch)
-         if (self%latch_side /= 0) margin = self%latch_side*(self%latch - theta)
+         if (self%latch_side /= 0 .and. .not. self%locked) margin = self%latch_side*(self%latch - theta)
          return ! the angle itself, not beyond
       case default ! there is no other part
          return
@@ -190,52 +196,73 @@ contains
       margin = margin + hysteresis
    end function margin
 
-   !> The margin of a part other than the latch has become negative: take the law on the other side.
-   pure subroutine change(self, part, t, theta, theta_rate, kind, lost)
+   !> The margin of a part other than the latch has become negative: take the law next to it. Freeplay has three in a row.
+   pure subroutine change(self, part, t, theta, theta_rate)
       class(hinge_mechanism), intent(inout) :: self
       integer, intent(in) :: part
       real(wp), intent(in) :: t, theta, theta_rate
-      integer, intent(out) :: kind
-      real(wp), intent(out) :: lost !! energy [J]
       integer :: i
 
-      lost = 0.0_wp
-      kind = 0
       select case (part)
       case (part_spring)
-         if (self%side == 0) then
-            self%side = merge(1, -1, theta > self%rest)
-            kind = kind_out_of_freeplay
-         else
-            self%side = 0
-            kind = kind_in_freeplay
-         end if
+         self%side = merge(0, merge(1, -1, theta > self%rest), self%side /= 0)
       case (part_lower, part_upper)
          i = part - part_lower + 1
          self%touches(i) = .not. self%touches(i)
-         lost = 0.5_wp*self%stop_stiffness*depth(self, i, theta)**2
-         if (self%touches(i)) then
-            lost = -lost ! what the face still held
-            kind = merge(kind_at_lower, kind_at_upper, i == 1)
-         else
-            self%face(i) = max(depth(self, i, theta), 0.0_wp)
-            self%left(i) = t
-            kind = merge(kind_off_lower, kind_off_upper, i == 1)
-         end if
+         if (self%touches(i)) return
+         self%face(i) = max(depth(self, i, theta), 0.0_wp)
+         self%left(i) = t
       case (part_friction)
-         if (self%slides == 0) then
-            self%slides = merge(1, -1, theta_rate > 0.0_wp)
-            kind = kind_slides
-         else
-            self%slides = 0
-            kind = kind_sticks
-         end if
+         self%slides = merge(0, merge(1, -1, theta_rate > 0.0_wp), self%slides /= 0)
       case default ! a latch has no other law
          return
       end select
    end subroutine change
 
-   !> Lock at the present angle.
+   !> What has happened to a part since it `was` so: events, and the energy they cost. A stop keeps that of its face when it is
+   !> left, and gives back what the face still has when it is met.
+   pure subroutine list_events(self, was, part, t, kinds, lost)
+      class(hinge_mechanism), intent(in) :: self
+      type(hinge_mechanism), intent(in) :: was
+      integer, intent(in) :: part
+      real(wp), intent(in) :: t
+      integer, allocatable, intent(out) :: kinds(:) !! in their order
+      real(wp), intent(out) :: lost                 !! by the last of them [J]
+      integer :: i
+
+      lost = 0.0_wp
+      allocate (kinds(0))
+      select case (part)
+      case (part_spring)
+         kinds = between(was%side, self%side, kind_in_freeplay, kind_out_of_freeplay)
+      case (part_lower, part_upper)
+         i = part - part_lower + 1
+         if (self%touches(i) .eqv. was%touches(i)) return
+         if (self%touches(i)) then
+            kinds = [merge(kind_at_lower, kind_at_upper, i == 1)]
+            lost = 0.0_wp - 0.5_wp*self%stop_stiffness*face_depth(was, i, t)**2 ! never -0
+         else
+            kinds = [merge(kind_off_lower, kind_off_upper, i == 1)]
+            lost = 0.5_wp*self%stop_stiffness*self%face(i)**2
+         end if
+      case (part_friction)
+         kinds = between(was%slides, self%slides, kind_sticks, kind_slides)
+      case default
+         return
+      end select
+   end subroutine list_events
+
+   !> Events on the way from one of three laws in a row, -1, 0 and 1, to another one.
+   pure function between(before, after, to_middle, from_middle) result(kinds)
+      integer, intent(in) :: before, after
+      integer, intent(in) :: to_middle, from_middle !! kinds of events
+      integer, allocatable :: kinds(:)
+      logical :: moved
+      moved = before /= after
+      kinds = pack([to_middle, from_middle], [moved .and. before /= 0, moved .and. after /= 0])
+   end function between
+
+   !> Lock at an angle.
    pure subroutine lock(self, theta)
       class(hinge_mechanism), intent(inout) :: self
       real(wp), intent(in) :: theta
@@ -243,13 +270,29 @@ contains
       self%lock_angle = theta
    end subroutine lock
 
-   !> Release; what a lock's spring holds is lost.
+   !> Look which way the latch is.
+   pure subroutine face_latch(self, theta)
+      class(hinge_mechanism), intent(inout) :: self
+      real(wp), intent(in) :: theta
+      if (self%latch < none_given) self%latch_side = merge(1, -1, self%latch > theta)
+   end subroutine face_latch
+
+   !> Lock at the latch, for good.
+   pure subroutine snap(self)
+      class(hinge_mechanism), intent(inout) :: self
+      call self%lock(self%latch)
+      self%latched = .true.
+   end subroutine snap
+
+   !> Release what was held; what the lock's spring holds is lost.
    pure subroutine release(self, theta, lost)
       class(hinge_mechanism), intent(inout) :: self
       real(wp), intent(in) :: theta
       real(wp), intent(out) :: lost !! [J]
       lost = 0.5_wp*self%lock_stiffness*(theta - self%lock_angle)**2
       self%locked = .false.
+      self%held = .false.
+      call self%face_latch(theta)
    end subroutine release
 
    !> Locked, and not by a spring?
