@@ -32,7 +32,8 @@ contains
                new_test('a release loses what its joint jumps, loads and steps of kinks work beside it', test_release_books), &
                new_test('a step of a kink into a stop and out of it loses nothing', test_step_at_stop), &
                new_test('what has latched stays so when another hinge is released', test_two_panels), &
-               new_test('no switch of any kind frees what has latched', test_latched_for_good)]
+               new_test('no switch of any kind frees what has latched', test_latched_for_good), &
+               new_test('a hinge that begins at its latch angle latches when it comes back', test_from_latch)]
    end subroutine collect_balance
 
    !> Uniform massless rods of length 1 on a fixed spacecraft, EI and C as given.
@@ -700,5 +701,44 @@ contains
          if (allocated(error)) return
       end do
    end subroutine test_latched_for_good
+
+   !> th - 0.1 = -+0.2 sin 5 t for J = 1, C = 25: back at the latch after pi/5 s, where J 1^2/2 is lost; not when a load is switched
+   !> in between. Held there and released, a damped hinge goes to its rest angle and never comes back.
+   subroutine test_from_latch(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+      type(trajectory) :: run
+      integer :: i
+
+      do i = 1, 3
+         call one_hinge(config, 1.0_wp, 25.0_wp, hinge_config(rest_angle=0.1_wp, latch_angle=0.1_wp))
+         config%model%bending = 'rigid'
+         config%chain%mass_per_length = 0.0_wp
+         config%initial%phi = 0.1_wp
+         config%initial%phi_rate = real(2*i - 3, wp)
+         deallocate (config%loads)
+         allocate (config%loads(1))
+         config%loads(1)%target = 'node'
+         config%loads(1)%node = 1
+         config%loads(1)%component = 'Y'
+         config%loads(1)%t_start = 0.2_wp
+         config%loads(1)%t_end = 0.3_wp
+         if (i == 3) then
+            config%initial%phi_rate = 0.0_wp
+            config%chain%hinge_damping = 8.0_wp
+            config%hinges = [hinge_config(held=.true., release_time=0.1_wp, rest_angle=-0.3_wp, latch_angle=0.1_wp)]
+         end if
+         call integrate(config, [0.0_wp, 0.9_wp], run, error)
+         if (allocated(error)) return
+         call check(error, run%n_events, 1, 'events')
+         if (allocated(error)) return
+         call check(error, run%events(1)%kind, merge(1, 2, i == 3), 'kind of the event')
+         if (allocated(error)) return
+         if (i == 3) call check(error, run%rows(2)%phi(1) < -0.2_wp, 'hardly a motion')
+         if (i < 3) call check_close(error, [run%events(1)%time, run%events(1)%energy_lost, run%rows(2)%phi(1)], &
+                                     [acos(-1.0_wp)/5.0_wp, 0.5_wp, 0.1_wp], 1.0e-8_wp, 'latch')
+         if (allocated(error)) return
+      end do
+   end subroutine test_from_latch
 
 end module test_balance

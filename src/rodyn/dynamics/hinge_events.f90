@@ -278,6 +278,7 @@ contains
       do i = 1, self%n
          if (.not. crossed(i)) cycle
          if (self%part(i) == part_latch) then
+            if (dynamics%scene%hinges%mechanisms(self%mechanism(i))%at_latch) cycle ! leaves it, see `settle`
             call latch(self, dynamics, self%mechanism(i), t, q, p, lost, error)
          else
             associate (mechanism => dynamics%scene%hinges%mechanisms(self%mechanism(i)))
@@ -446,6 +447,11 @@ contains
          end associate
          call latch(self, dynamics, i, t, q, p, lost, error)
       end do
+      do i = 1, size(was)
+         associate (mechanism => dynamics%scene%hinges%mechanisms(i))
+            if (mechanism%at_latch .and. .not. mechanism%locked) call mechanism%face_latch(self%theta(mechanism%hinge))
+         end associate
+      end do
       do i = 1, self%n
          call note_part(self, dynamics, i, was(self%mechanism(i)), t, lost, error)
          if (allocated(error)) return
@@ -467,6 +473,7 @@ contains
          if (self%part(i) /= part_latch) cycle
          if (.not. margin_of(self, dynamics, i, t) < 0.0_wp) cycle
          associate (mechanism => dynamics%scene%hinges%mechanisms(self%mechanism(i)))
+            if (mechanism%at_latch) cycle
             way = (mechanism%latch - before(mechanism%hinge))/(self%theta(mechanism%hinge) - before(mechanism%hinge))
             if (first > 0 .and. .not. way < shortest) cycle
             first = self%mechanism(i)

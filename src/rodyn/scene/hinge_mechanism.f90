@@ -63,6 +63,7 @@ module rodyn_hinge_mechanism
       logical :: latched = .false.          !! for good
       real(wp) :: lock_angle = 0.0_wp       !! [rad]
       integer :: latch_side = 0             !! sign of the way to the latch; 0: there is none
+      logical :: at_latch = .false.         !! not latched, but still where it began or was released: at its latch
    contains
       procedure :: settle
       procedure :: margin
@@ -188,7 +189,9 @@ contains
             margin = self%slides*theta_rate - self%friction_velocity
          end if
       case (part_latch)
-         if (self%latch_side /= 0 .and. .not. self%locked) margin = self%latch_side*(self%latch - theta)
+         if (self%locked) return
+         if (self%at_latch) margin = hysteresis - abs(self%latch - theta)
+         if (self%latch_side /= 0) margin = self%latch_side*(self%latch - theta)
          return ! the angle itself, not beyond
       case default ! there is no other part
          return
@@ -270,11 +273,13 @@ contains
       self%lock_angle = theta
    end subroutine lock
 
-   !> Look which way the latch is.
+   !> Look which way the latch is. One that is just here does not catch before the hinge comes back.
    pure subroutine face_latch(self, theta)
       class(hinge_mechanism), intent(inout) :: self
       real(wp), intent(in) :: theta
-      if (self%latch < none_given) self%latch_side = merge(1, -1, self%latch > theta)
+      if (.not. self%latch < none_given) return
+      self%at_latch = abs(self%latch - theta) < hysteresis
+      self%latch_side = merge(0, merge(1, -1, self%latch > theta), self%at_latch)
    end subroutine face_latch
 
    !> Lock at the latch, for good.

@@ -130,7 +130,7 @@ contains
       integer :: i
 
       middle = t_from + 0.5_wp*(t_to - t_from)
-      moves = set%programs%t_start < middle .and. middle < set%programs%t_end
+      moves = set%programs%t_start < middle .and. middle < set%programs%t_end .and. .not. is_still(set%programs)
       allocate (regime%constant(0:size(set%constant) - 1), source=set%constant)
       allocate (regime%moving(count(moves)))
       do i = 1, size(moves)
@@ -146,6 +146,13 @@ contains
          end associate
       end do
    end subroutine new_kink_regime
+
+   !> Does the program have the same value at all times?
+   elemental logical function is_still(program)
+      type(kink_program), intent(in) :: program
+      is_still = .not. abs(program%value) > 0.0_wp
+      if (program%law == law_table) is_still = .not. any(abs(program%values - program%values(1)) > 0.0_wp)
+   end function is_still
 
    !> gamma, gamma' and gamma'' of all hinges at time t.
    pure subroutine evaluate_kinks(regime, t, kink, kink_rate, kink_acceleration)
