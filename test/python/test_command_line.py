@@ -682,15 +682,16 @@ def test_a_run_with_a_ledger_makes_the_same_steps_as_one_without(tmp_path):
                 assert first[name][:].tobytes() == second[name][:].tobytes(), (method, name)
 
 
-@pytest.mark.parametrize("name", ["SIGTERM", "SIGUSR1", "SIGINT"])
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGUSR1", "SIGUSR2", "SIGHUP", "SIGXCPU", "SIGINT"])
 def test_a_signal_stops_a_run_that_can_be_made_again(tmp_path: pathlib.Path, name: str) -> None:
     """Exit 75, rows until then beside the place of the result, and the same command works again."""
     case = tmp_path / "long.nml"
     text = (ROOT / "cases" / "table1.nml").read_text()
     case.write_text(text.replace("t_end = 30 ", "t_end = 10000 "))
     command = [str(RODYN), "run", str(case), "--output", str(tmp_path / "long.h5")]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        time.sleep(1.5)
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                          preexec_fn=lambda: signal.signal(getattr(signal, name), signal.SIG_DFL)) as process:
+        wait_for_start(tmp_path)
         process.send_signal(getattr(signal, name))
         start = time.monotonic()
         errors = process.communicate(timeout=30)[1]
@@ -703,6 +704,41 @@ def test_a_signal_stops_a_run_that_can_be_made_again(tmp_path: pathlib.Path, nam
         assert rows["time"].size > 0
     case.write_text(text.replace("t_end = 30 ", "t_end = 0.1 "))
     assert subprocess.run(command, capture_output=True, check=False).returncode == 0
+
+
+def wait_for_start(directory: pathlib.Path) -> None:
+    """Until a run has begun its file."""
+    end = time.monotonic() + 30.0
+    while not list(directory.glob("*.partial-*")) and time.monotonic() < end:
+        time.sleep(0.02)
+    time.sleep(0.1)
+
+
+def test_a_signal_that_is_ignored_stays_so(tmp_path):
+    """As SIGHUP is under nohup."""
+    write_case(tmp_path, (ROOT / "cases" / "table1.nml").read_text())
+    with subprocess.Popen([RODYN, "run", "case.nml", "--output", "case.h5"], cwd=tmp_path, stdout=subprocess.PIPE,
+                          stderr=subprocess.PIPE, preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN)) as process:
+        wait_for_start(tmp_path)
+        process.send_signal(signal.SIGHUP)
+        errors = process.communicate(timeout=60)[1]
+    assert process.returncode == 0, errors
+    assert files(tmp_path) == ["case.h5", "case.nml"]
+
+
+@pytest.mark.parametrize("command", ["run", "modes", "sweep"])
+def test_a_reader_who_leaves_does_not_end_a_command(tmp_path, command):
+    """As in `rodyn run case.nml | head -1`, and with standard error into the same pipe."""
+    write_case(tmp_path, SCENES["flexible"])
+    (tmp_path / "s.nml").write_text("&sweep base = 'case.nml' /\n&axis key = 'case.t_end', values = 0.01, 0.02 /\n")
+    for number, also in enumerate(({}, {"stderr": subprocess.STDOUT})):
+        read, write = os.pipe()
+        os.close(read)
+        done = subprocess.run([RODYN, command, "s.nml" if command == "sweep" else "case.nml", "--output", f"out{number}"],
+                              cwd=tmp_path, stdout=write, timeout=60, **also)
+        os.close(write)
+        assert done.returncode == 0
+        assert (tmp_path / f"out{number}").exists()
 
 
 def test_the_number_of_threads_does_not_change_a_run(tmp_path):

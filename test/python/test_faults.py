@@ -5,12 +5,14 @@ result can be made again, from its input and from its file alone. The campaigns 
 import os
 import pathlib
 import random
+import re
 import resource
 import shutil
 import signal
 import subprocess
 import sys
 import tempfile
+import time
 
 import h5py
 import numpy as np
@@ -409,14 +411,94 @@ def test_no_signal_and_no_full_disk_leaves_a_file_that_looks_complete(tmp_path):
 
 
 def test_too_little_address_space_is_told_not_suffered(place):
-    """Whatever the limit: the run ends by itself, and never with a file that is not complete. One thread: those that OpenBLAS
-    makes when it is loaded wait for memory for ever, and the end of the program waits for them."""
-    for megabytes in (20, 60, *range(80, 260, 15), 400):
+    """Whatever the limit: a command ends by itself, and a run never with a file that is not complete. (Threads of OpenBLAS, made
+    when it is loaded, would wait for memory for ever, and the end of the program for them.)"""
+    (place / "s.nml").write_text("&sweep base = 'case.nml' /\n&axis key = 'case.t_end', values = 0.01, 0.02 /\n")
+    for megabytes in (20, 60, *range(80, 260, 20), 400):
         limit = megabytes << 20
-        result = subprocess.run([RODYN, "run", "case.nml", "--force"], cwd=place, capture_output=True, text=True, timeout=60,
-                                env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
-                                preexec_fn=lambda limit=limit: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)))
+
+        def limited(*arguments, limit=limit):
+            return rodyn(*arguments, cwd=place, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)))
+
+        for arguments in (["--version"], ["check", "case.nml"]):  # below 100 MB the libraries cannot be loaded
+            assert limited(*arguments).returncode == (127 if megabytes < 80 else 0) or 80 <= megabytes < 110
+        for arguments in (["modes", "case.nml", "--output", "modes.h5", "--force"], ["sweep", "s.nml", "--force"]):
+            result = limited(*arguments)
+            assert result.returncode == 0 or result.stderr
+        result = limited("run", "case.nml", "--force")
         assert result.returncode != 0 or (place / "case.h5").exists()
         if (place / "case.h5").exists():
             with h5py.File(place / "case.h5") as file:
                 assert file.attrs["status"] == b"done" and file["time"].size == 21
+
+
+def test_one_thread_whatever_the_environment_says(place):
+    (place / "case.nml").write_text(CASE.replace("t_end = 0.05", "t_end = 1000"))
+    with subprocess.Popen([RODYN, "run", "case.nml", "--quiet"], cwd=place, stderr=subprocess.PIPE,
+                          env=os.environ | {"OPENBLAS_NUM_THREADS": "4"}) as process:
+        while not list(place.glob("*.partial-*")) and process.poll() is None:
+            time.sleep(0.01)
+        status = pathlib.Path(f"/proc/{process.pid}/status").read_text()
+        process.terminate()
+        process.communicate()
+    assert "\nThreads:\t1\n" in status
+    assert f"Cpus_allowed:\t{re.search('Cpus_allowed:.(.*)', pathlib.Path('/proc/self/status').read_text())[1]}\n" in status
+
+
+@pytest.mark.parametrize("hard", [True, False])
+def test_a_small_stack_is_told_or_raised(place, hard):
+    kilobytes = 64 << 10
+    limits = (kilobytes, kilobytes if hard else resource.RLIM_INFINITY)
+    result = rodyn("run", "case.nml", cwd=place, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_STACK, limits))
+    if hard:
+        refused(result, "the stack may have only 65.5 kB", "ulimit -s")
+    else:
+        assert result.returncode == 0, result.stderr
+
+
+#: A file system without locks, as NFS and Lustre may be.
+NO_LOCKS = """
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <stdarg.h>
+#include <stdlib.h>
+int flock(int descriptor, int operation) { errno = atoi(getenv("LOCK_ERRNO")); return -1; }
+int fcntl(int descriptor, int command, ...) {
+   va_list rest; va_start(rest, command); void *argument = va_arg(rest, void *); va_end(rest);
+   if (command == F_GETLK || command == F_SETLK || command == F_SETLKW) { errno = atoi(getenv("LOCK_ERRNO")); return -1; }
+   return ((int (*)(int, int, ...))dlsym(RTLD_NEXT, "fcntl"))(descriptor, command, argument);
+}
+int fcntl64(int descriptor, int command, ...) {
+   va_list rest; va_start(rest, command); void *argument = va_arg(rest, void *); va_end(rest);
+   return fcntl(descriptor, command, argument);
+}
+"""
+
+
+@pytest.fixture(scope="module")
+def no_locks(tmp_path_factory) -> dict[str, str]:
+    """An environment whose file systems have no locks."""
+    place = tmp_path_factory.mktemp("no_locks")
+    (place / "no_locks.c").write_text(NO_LOCKS)
+    subprocess.run(["gcc", "-shared", "-fPIC", "-o", "no_locks.so", "no_locks.c", "-ldl"], cwd=place, check=True)
+    return os.environ | {"LD_PRELOAD": str(place / "no_locks.so")}
+
+
+@pytest.mark.parametrize("number, name", [(37, "No locks available"), (38, "Function not implemented"),
+                                          (95, "Operation not supported")])
+def test_file_systems_without_locks(place, no_locks, number, name):
+    env = no_locks | {"LOCK_ERRNO": str(number)}
+    (place / "s.nml").write_text("&sweep base = 'case.nml' /\n&axis key = 'case.t_end', values = 0.01, 0.02 /\n")
+    for arguments in (["run", "case.nml"], ["run", "case.h5"], ["modes", "case.nml"], ["check", "case.h5"]):
+        result = rodyn(*arguments, cwd=place, env=env)
+        assert result.returncode == 0, result.stderr
+    result = rodyn("run", "case.nml", "--output", "x.h5", cwd=place, env=env | {"HDF5_USE_FILE_LOCKING": "TRUE"})
+    assert result.returncode == 1 and name in result.stderr and "HDF5_USE_FILE_LOCKING=FALSE" in result.stderr, result.stderr
+    assert not list(place.glob("x.h5*"))
+    refused(rodyn("sweep", "s.nml", cwd=place, env=env), name, "no locks", "HDF5_USE_FILE_LOCKING=FALSE")
+    off = env | {"HDF5_USE_FILE_LOCKING": "FALSE"}
+    refused(rodyn("sweep", "s.nml", "--shard", "1/2", cwd=place, env=off), "shards need a file system with locks")
+    result = rodyn("sweep", "s.nml", cwd=place, env=off)
+    assert result.returncode == 0, result.stderr

@@ -6,18 +6,19 @@ module rodyn_posix
       c_long, c_null_char, c_null_funptr, c_null_ptr, c_ptr, c_size_t
    implicit none (type, external)
    private
-   public :: posix_close, posix_closedir, posix_fsync, posix_open, posix_opendir, posix_signal ! for `rodyn_posix_files`
+   public :: posix_close, posix_closedir, posix_fsync, posix_open, posix_opendir, posix_signal, sig_ign ! for `rodyn_posix_files`
    public :: read_all
    public :: process_id, host_name, utc_now
    public :: path_exists, same_path, is_directory, is_special, is_writable, parent_directory
    public :: sync_path, rename_over, rename_new, remove_file
-   public :: ignore_file_size_signal, write_output
+   public :: ignore_signal, sigpipe, sigxfsz, write_output, write_text, standard_output, standard_error
    public :: last_failure, last_failure_is
 
    integer(c_int), parameter :: f_ok = 0, w_ok = 2, x_ok = 1               ! <unistd.h>
    integer(c_int), parameter :: o_rdonly = 0                               ! <fcntl.h>
    integer(c_int), parameter :: eperm = 1, enomem = 12, eexist = 17, emlink = 31, enosys = 38, enotsup = 95 ! <errno.h>, Linux
-   integer(c_int), parameter :: sigxfsz = 25                               ! <signal.h>, Linux
+   integer(c_int), parameter :: sigpipe = 13, sigxfsz = 25                 ! <signal.h>, Linux
+   integer(c_int), parameter :: standard_output = 1, standard_error = 2    ! <unistd.h>
    integer(c_intptr_t), parameter :: sig_ign = 1_c_intptr_t                ! <signal.h>
 
    interface
@@ -371,24 +372,34 @@ contains
       if (posix_unlink(path//c_null_char) /= 0) failure = last_failure()
    end function remove_file
 
-   !> Let a write beyond the file-size limit (ulimit -f) fail with EFBIG; by default the signal SIGXFSZ kills.
-   subroutine ignore_file_size_signal()
+   !> Let what causes a signal fail with a reason instead: a write beyond the file-size limit (SIGXFSZ, EFBIG), or into a
+   !> pipe that nobody reads (SIGPIPE, EPIPE). By default these signals kill.
+   subroutine ignore_signal(number)
+      integer(c_int), intent(in) :: number
       type(c_funptr) :: previous
-      previous = posix_signal(sigxfsz, transfer(sig_ign, c_null_funptr))
-   end subroutine ignore_file_size_signal
+      previous = posix_signal(number, transfer(sig_ign, c_null_funptr))
+   end subroutine ignore_signal
 
    !> Write to standard output at once. (Fortran's own units notice a full disk or a closed output too late, or never.)
    function write_output(text) result(failure)
       character(len=*), intent(in) :: text
       character(len=:), allocatable :: failure !! empty on success
-      integer(c_int), parameter :: standard_output = 1, eintr = 4
+      failure = write_text(standard_output, text)
+   end function write_output
+
+   !> Write a text to an open file.
+   function write_text(descriptor, text) result(failure)
+      integer(c_int), intent(in) :: descriptor
+      character(len=*), intent(in) :: text
+      character(len=:), allocatable :: failure !! empty on success
+      integer(c_int), parameter :: eintr = 4
       integer(c_intptr_t) :: written
       integer :: done
 
       failure = ''
       done = 0
       do while (done < len(text))
-         written = posix_write(standard_output, text(done + 1:), int(len(text) - done, c_size_t))
+         written = posix_write(descriptor, text(done + 1:), int(len(text) - done, c_size_t))
          if (written > 0) then
             done = done + int(written)
          else if (errno() /= eintr) then
@@ -396,7 +407,7 @@ contains
             return
          end if
       end do
-   end function write_output
+   end function write_text
 
    !> Everything that can be read behind a path, whatever its kind: a file, a pipe, a device; its size is not asked for.
    subroutine read_all(path, most, text, failure)

@@ -5,10 +5,10 @@ module rodyn_posix_files
    use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_funloc, c_funptr, c_int, c_int16_t, &
       c_int64_t, c_loc, c_long, c_null_char, c_ptr, c_size_t
    use rodyn_checksum, only: crc64_text
-   use rodyn_errors, only: error_type, raise
+   use rodyn_errors, only: error_type, exit_bad_input, raise
    use rodyn_kinds, only: i8
-   use rodyn_posix, only: last_failure, last_failure_is, parent_directory, path_exists, rename_over, sync_path, &
-      posix_close, posix_closedir, posix_fsync, posix_open, posix_opendir, posix_signal
+   use rodyn_posix, only: ignore_signal, last_failure, last_failure_is, parent_directory, path_exists, rename_over, sig_ign, &
+      sync_path, posix_close, posix_closedir, posix_fsync, posix_open, posix_opendir, posix_signal
    use rodyn_text, only: to_text
    implicit none (type, external)
    private
@@ -22,8 +22,12 @@ module rodyn_posix_files
    integer(c_int), parameter :: f_getlk = 5, f_setlk = 6, f_setlkw = 7   ! <fcntl.h>, Linux, 64 bit
    integer(c_int16_t), parameter :: f_wrlck = 1, f_unlck = 2, seek_set = 0
    integer(c_int), parameter :: file_mode = int(o'644', c_int), directory_mode = int(o'755', c_int)
-   integer, parameter :: eexist = 17                                     ! <errno.h>
-   integer(c_int), parameter :: sigint = 2, sigusr1 = 10, sigterm = 15   ! <signal.h>, Linux
+   integer, parameter :: eagain = 11, eacces = 13, eexist = 17           ! <errno.h>
+   integer(i8), parameter :: probe = 2_i8**51                            !! byte on which locks are tried
+   !> Signals that ask to stop, <signal.h> of Linux. SIGXCPU comes at the soft limit of CPU time, some seconds before the end.
+   integer(c_int), parameter :: watched(6) = [1_c_int, 2_c_int, 10_c_int, 12_c_int, 15_c_int, 24_c_int]
+   character(len=*), parameter :: watched_names(6) = [character(len=7) :: 'SIGHUP', 'SIGINT', 'SIGUSR1', 'SIGUSR2', 'SIGTERM', &
+                                                    'SIGXCPU']
    integer, parameter :: name_offset = 19                                ! of d_name in struct dirent, Linux, 64 bit
    integer, parameter :: longest_name = 255
 
@@ -31,6 +35,7 @@ module rodyn_posix_files
    type :: lock_file
       integer(c_int) :: descriptor = -1
       character(len=:), allocatable :: path
+      logical :: pretend = .false. !! nothing is locked
    end type lock_file
 
    !> struct flock of Linux, 64 bit
@@ -344,11 +349,14 @@ contains
       if (len(failure) == 0) failure = sync_path(parent_directory(name))
    end subroutine rename_aside
 
-   !> Open, perhaps make, a lock file. It is never removed: a lock is on its bytes and ends with the process.
+   !> Open, perhaps make, a lock file. It is never removed: a lock is on its bytes and ends with the process. Where the file
+   !> system has no locks, that is an error, unless the user has said that they shall not be used.
    subroutine open_lock(self, path, error)
       type(lock_file), intent(out) :: self
       character(len=*), intent(in) :: path
       type(error_type), allocatable, intent(out) :: error
+      character(len=:), allocatable :: failure
+      logical :: taken
 
       self%path = path
       if (path_exists(path)) then
@@ -356,20 +364,41 @@ contains
       else
          self%descriptor = create_file(path)
       end if
-      if (self%descriptor < 0) call raise(error, path//': cannot be opened: '//last_failure())
+      if (self%descriptor < 0) then
+         call raise(error, path//': cannot be opened: '//last_failure())
+         return
+      end if
+      call take_lock(self, probe, 1_i8, .false., taken, failure)
+      if (taken) call release_lock(self, probe, 1_i8)
+      if (len(failure) == 0) return
+      self%pretend = locks_are_switched_off()
+      if (.not. self%pretend) call raise(error, path//': cannot be locked: '//failure//'; the file system seems to have no '// &
+         'locks. Use another directory, or set HDF5_USE_FILE_LOCKING=FALSE where nobody else works in this one', exit_bad_input)
    end subroutine open_lock
 
-   !> Lock bytes for this process alone; false if another process has one of them.
-   function take_lock(self, start, length, wait) result(taken)
+   !> Does the environment say what HDF5 takes for it?
+   logical function locks_are_switched_off()
+      character(len=16) :: value
+      call get_environment_variable('HDF5_USE_FILE_LOCKING', value)
+      locks_are_switched_off = value == 'FALSE' .or. value == '0' .or. value == 'BEST_EFFORT'
+   end function locks_are_switched_off
+
+   !> Lock bytes for this process alone.
+   subroutine take_lock(self, start, length, wait, taken, failure)
       type(lock_file), intent(in) :: self
       integer(i8), intent(in) :: start, length !! length 0: to the end of all
       logical, intent(in) :: wait              !! until they are free
-      logical :: taken
+      logical, intent(out) :: taken
+      character(len=:), allocatable, intent(out) :: failure !! why not; empty: another process has one of them
       type(flock_record) :: record
 
+      failure = ''
       record = flock_record(f_wrlck, seek_set, start, length, 0)
-      taken = posix_fcntl(self%descriptor, merge(f_setlkw, f_setlk, wait), record) == 0
-   end function take_lock
+      taken = self%pretend
+      if (.not. taken) taken = posix_fcntl(self%descriptor, merge(f_setlkw, f_setlk, wait), record) == 0
+      if (taken .or. last_failure_is(eacces) .or. last_failure_is(eagain)) return
+      failure = last_failure()
+   end subroutine take_lock
 
    !> Process that has locked one of these bytes; 0: none.
    function lock_holder(self, start, length) result(pid)
@@ -379,7 +408,7 @@ contains
       type(flock_record) :: record
 
       pid = 0
-      if (length < 0) return
+      if (length < 0 .or. self%pretend) return
       record = flock_record(f_wrlck, seek_set, start, length, 0)
       if (posix_fcntl(self%descriptor, f_getlk, record) /= 0) return
       if (record%kind == f_unlck) return
@@ -392,16 +421,20 @@ contains
       integer(i8), intent(in) :: start, length
       type(flock_record) :: record
       integer(c_int) :: status
+      if (self%pretend) return
       record = flock_record(f_unlck, seek_set, start, length, 0)
       status = posix_fcntl(self%descriptor, f_setlk, record)
    end subroutine release_lock
 
-   !> From now on SIGTERM, SIGUSR1 and SIGINT only leave a note.
+   !> From now on the watched signals only leave a note. One that is ignored already, as SIGHUP is under nohup, stays so.
    subroutine watch_signals()
       type(c_funptr) :: previous
-      previous = posix_signal(sigterm, c_funloc(note_signal))
-      previous = posix_signal(sigusr1, c_funloc(note_signal))
-      previous = posix_signal(sigint, c_funloc(note_signal))
+      integer :: i
+
+      do i = 1, size(watched)
+         previous = posix_signal(watched(i), c_funloc(note_signal))
+         if (transfer(previous, sig_ign) == sig_ign) call ignore_signal(watched(i))
+      end do
    end subroutine watch_signals
 
    subroutine note_signal(number) bind(c)
@@ -412,16 +445,11 @@ contains
    !> Name of the signal that asks to stop; empty: none came.
    function stop_signal() result(name)
       character(len=:), allocatable :: name
-      select case (caught)
-      case (0)
-         name = ''
-      case (sigterm)
-         name = 'SIGTERM'
-      case (sigusr1)
-         name = 'SIGUSR1'
-      case default
-         name = 'SIGINT'
-      end select
+      integer :: place
+
+      place = findloc(watched, caught, dim=1)
+      name = ''
+      if (place > 0) name = trim(watched_names(place))
    end function stop_signal
 
 end module rodyn_posix_files

@@ -2,13 +2,15 @@
 !> refused with a message, rather than end in an allocation that fails or in the system's memory killer.
 module rodyn_resources
    use, intrinsic :: iso_c_binding, only: c_char, c_int, c_int64_t, c_null_char
+   use rodyn_errors, only: error_type, exit_bad_input, raise
    use rodyn_kinds, only: wp
    use rodyn_text, only: formatted
    implicit none (type, external)
    private
-   public :: free_memory, free_disk, byte_text
+   public :: ensure_stack, free_memory, free_disk, byte_text
 
-   integer(c_int), parameter :: rlimit_as = 9     ! <sys/resource.h>, Linux
+   integer(c_int), parameter :: rlimit_stack = 3, rlimit_as = 9 ! <sys/resource.h>, Linux
+   integer(c_int64_t), parameter :: least_stack = 1024*1024     !! of the program, several times what it uses [bytes]
    real(wp), parameter :: unknown = 1.0e300_wp
 
    interface
@@ -19,6 +21,14 @@ module rodyn_resources
          integer(c_int64_t), intent(out) :: limits(2) !! soft, hard; -1: none
          integer(c_int) :: status
       end function posix_getrlimit
+
+      function posix_setrlimit(resource, limits) result(status) bind(c, name='setrlimit')
+         import :: c_int, c_int64_t
+         implicit none (type, external)
+         integer(c_int), intent(in), value :: resource
+         integer(c_int64_t), intent(in) :: limits(2)
+         integer(c_int) :: status
+      end function posix_setrlimit
 
       ! struct statvfs has 11 words and 6 spare integers on 64-bit Linux
       function posix_statvfs(path, words) result(status) bind(c, name='statvfs')
@@ -31,6 +41,20 @@ module rodyn_resources
    end interface
 
 contains
+
+   !> Raise a limit of the stack that is too low (ulimit -s), or say that it is.
+   subroutine ensure_stack(error)
+      type(error_type), allocatable, intent(out) :: error
+      integer(c_int64_t) :: limits(2)
+
+      if (posix_getrlimit(rlimit_stack, limits) /= 0) return
+      if (limits(1) < 0 .or. limits(1) >= least_stack) return
+      if (limits(2) < 0 .or. limits(2) >= least_stack) then
+         if (posix_setrlimit(rlimit_stack, [least_stack, limits(2)]) == 0) return
+      end if
+      call raise(error, 'rodyn: the stack may have only '//byte_text(real(limits(1), wp))//', and '// &
+                 byte_text(real(least_stack, wp))//' are needed: raise ulimit -s', exit_bad_input)
+   end subroutine ensure_stack
 
    !> Memory that can be had without pushing anything out; huge if the system does not tell [bytes].
    real(wp) function free_memory()
@@ -88,7 +112,9 @@ contains
    pure function byte_text(bytes) result(text)
       real(wp), intent(in) :: bytes
       character(len=:), allocatable :: text
-      if (bytes < 1.0e8_wp) then
+      if (bytes < 1.0e6_wp) then
+         text = formatted(1.0e-3_wp*bytes, '(f12.1)')//' kB'
+      else if (bytes < 1.0e9_wp) then
          text = formatted(1.0e-6_wp*bytes, '(f12.1)')//' MB'
       else if (bytes < 1.0e12_wp) then
          text = formatted(1.0e-9_wp*bytes, '(f12.1)')//' GB'

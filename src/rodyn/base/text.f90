@@ -1,6 +1,6 @@
 !> Small services on text: case, numbers as text, quotes, nearest names.
 module rodyn_text
-   use rodyn_kinds, only: wp
+   use rodyn_kinds, only: i8, wp
    use rodyn_utf8, only: first_bad_byte
    implicit none (type, external)
    private
@@ -11,6 +11,7 @@ module rodyn_text
    !> A number as the shortest text (integer), or with 17 significant digits (real), or as T or F.
    interface to_text
       module procedure integer_text
+      module procedure long_text
       module procedure real_text
       module procedure logical_text
    end interface to_text
@@ -51,6 +52,14 @@ contains
       write (digits, '(i0)') i
       text = trim(digits)
    end function integer_text
+
+   pure function long_text(i) result(text)
+      integer(i8), intent(in) :: i
+      character(len=:), allocatable :: text
+      character(len=24) :: digits
+      write (digits, '(i0)') i
+      text = trim(digits)
+   end function long_text
 
    !> 17 significant digits: reading them back gives the same number.
    pure function real_text(x) result(text)

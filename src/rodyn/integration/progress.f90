@@ -67,6 +67,7 @@ contains
       integer(i8), intent(in) :: n_steps !! internal steps so far
 
       integer(i8) :: now, rate
+      integer :: stat
       character(len=:), allocatable :: line
 
       if (self%quiet) return
@@ -75,12 +76,13 @@ contains
       self%clock_print = now
       line = progress_line(t, self%t_start, self%t_end, n_steps, real(now - self%clock_start, wp)/real(rate, wp))
       if (self%terminal) then
-         write (self%unit, '(3a)', advance='no') achar(13), line, repeat(' ', max(0, self%width - len(line)))
+         write (self%unit, '(3a)', advance='no', iostat=stat) achar(13), line, repeat(' ', max(0, self%width - len(line)))
          self%width = len(line)
       else
-         write (self%unit, '(a)') line
+         write (self%unit, '(a)', iostat=stat) line
       end if
-      flush (self%unit)
+      if (stat == 0) flush (self%unit, iostat=stat)
+      self%quiet = stat /= 0 ! nobody reads along any more
    end subroutine report
 
    !> True after a signal that the program watches.
@@ -94,9 +96,11 @@ contains
    !> Wipe the line from a terminal, so that what follows starts at the margin.
    subroutine finish(self)
       class(progress_monitor), intent(inout) :: self
+      integer :: stat
       if (self%quiet .or. .not. self%terminal .or. self%width == 0) return
-      write (self%unit, '(3a)', advance='no') achar(13), repeat(' ', self%width), achar(13)
-      flush (self%unit)
+      write (self%unit, '(3a)', advance='no', iostat=stat) achar(13), repeat(' ', self%width), achar(13)
+      if (stat == 0) flush (self%unit, iostat=stat)
+      self%quiet = stat /= 0
       self%width = 0
    end subroutine finish
 

@@ -6,8 +6,8 @@ module rodyn_result_file
    use rodyn_build_info, only: compiler, compiler_options, git_commit, program_version
    use rodyn_errors, only: error_type, exit_bad_input, raise
    use rodyn_hdf5_files, only: hdf5_file, hdf5_version
-   use rodyn_posix, only: host_name, ignore_file_size_signal, is_directory, is_special, is_writable, parent_directory, &
-      path_exists, process_id, remove_file, rename_new, rename_over, sync_path, utc_now
+   use rodyn_posix, only: host_name, ignore_signal, is_directory, is_special, is_writable, parent_directory, &
+      path_exists, process_id, remove_file, rename_new, rename_over, sigxfsz, sync_path, utc_now
    implicit none (type, external)
    private
    public :: provenance, result_file, check_output_path, text_or_empty
@@ -76,7 +76,7 @@ contains
 
       call check_output_path(path, force, error)
       if (allocated(error)) return
-      call ignore_file_size_signal()
+      call ignore_signal(sigxfsz)
       self%path = path
       self%temporary_path = free_temporary_name(path)
       self%force = force

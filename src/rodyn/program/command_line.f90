@@ -1,6 +1,5 @@
 !> The commands of the program: `rodyn --help`.
 module rodyn_command_line
-   use, intrinsic :: iso_fortran_env, only: error_unit
    use rodyn_errors, only: error_type, raise, exit_done, exit_bad_input
    use rodyn_case_config, only: case_config
    use rodyn_case_reader, only: default_case, parse_case
@@ -8,11 +7,13 @@ module rodyn_command_line
    use rodyn_modal_analysis, only: analyse_modes
    use rodyn_posix_files, only: watch_signals
    use rodyn_run, only: check_steps, run_case
-   use rodyn_posix, only: same_path, write_output
+   use rodyn_posix, only: ignore_signal, same_path, sigpipe, write_output
+   use rodyn_resources, only: ensure_stack
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_sweep_config, only: sweep_config
    use rodyn_sweep_engine, only: run_sweep, sweep_options
    use rodyn_sweep_reader, only: default_sweep, parse_sweep
+   use rodyn_terminal, only: print_error_line
    use rodyn_text, only: as_utf8
    use rodyn_build_info, only: program_version, git_commit
    implicit none (type, external)
@@ -48,7 +49,9 @@ contains
       if (command_argument_count() > 0) command = argument(1)
       select case (command)
       case ('run', 'check', 'sweep', 'modes')
-         call read_options(options, error)
+         call ignore_signal(sigpipe) ! what nobody reads does not end what is computed
+         call ensure_stack(error)
+         if (.not. allocated(error)) call read_options(options, error)
          if (.not. allocated(error)) then
             if (options%help) then
                call print_text(help_text(command), error)
@@ -76,7 +79,7 @@ contains
       end select
       exit_code = exit_done
       if (.not. allocated(error)) return
-      write (error_unit, '(a)') as_utf8(error%message)
+      call print_error_line(as_utf8(error%message))
       exit_code = error%exit_code
    end subroutine run_command
 

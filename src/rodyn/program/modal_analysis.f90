@@ -1,6 +1,5 @@
 !> One case from its description to its modes: what `rodyn modes` does, and what a library user may call.
 module rodyn_modal_analysis
-   use, intrinsic :: iso_fortran_env, only: output_unit
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: case_config, load_config
    use rodyn_case_reader, only: resolved_case
@@ -14,7 +13,10 @@ module rodyn_modal_analysis
    use rodyn_motion, only: motion_type, new_motion, initial_state
    use rodyn_notes, only: notes_on
    use rodyn_result_file, only: check_output_path, provenance
+   use rodyn_run_needs, only: check_memory, memory_of_scene, of_program
    use rodyn_scene, only: scene_type, new_scene
+   use rodyn_terminal, only: print_line
+   use rodyn_text, only: to_text
    implicit none (type, external)
    private
    public :: analyse_modes, modes_at_start
@@ -46,6 +48,8 @@ contains
       if (present(quiet)) silent = quiet
       if (present(force)) replace = force
       call check_output_path(path, replace, error)
+      if (.not. allocated(error)) call check_memory('n_rods = '//to_text(config%chain%n_rods), &
+                                                    of_program + memory_of_scene(config), error)
       if (.not. allocated(error)) call new_scene(scene, config, error)
       if (.not. allocated(error)) call new_motion(motion, scene, .false., error)
       if (.not. allocated(error)) call modes_at_start(motion, config, equilibrium, loads, .true., model, modes, error)
@@ -58,9 +62,9 @@ contains
       call write_modes(path, replace, origin, motion%dynamics%scene, model, modes, equilibrium, error)
       if (allocated(error) .or. silent) return
       call print_table(modes)
-      if (.not. equilibrium .and. .not. model%is_steady(modes%fastest)) write (output_unit, '(a)') &
-         'note    the initial state is no equilibrium: these are the modes of its equations held at t = 0; see --equilibrium'
-      write (output_unit, '(a)') 'file    '//path
+      if (.not. equilibrium .and. .not. model%is_steady(modes%fastest)) call print_line(&
+         'note    the initial state is no equilibrium: these are the modes of its equations held at t = 0; see --equilibrium')
+      call print_line('file    '//path)
    end subroutine analyse_modes
 
    !> Linear model and modes of a case at t = 0. Hinges have the laws that hold there: those that are held are locked.
@@ -97,7 +101,7 @@ contains
       frequency = modes%frequency()
       ratio = modes%damping_ratio()
       decay = modes%decay()
-      write (output_unit, '(a)') '  mode   frequency, rad/s   frequency, Hz   damping ratio      decay, 1/s   kind'
+      call print_line('  mode   frequency, rad/s   frequency, Hz   damping ratio      decay, 1/s   kind')
       do i = 1, min(modes%n, most_rows)
          if (modes%kind(i) == rigid_body .or. modes%kind(i) == mechanism) then
             write (line, '(i6, f19.6, f16.6, 35x, a)') i, 0.0_wp, 0.0_wp, modes%kind(i)
@@ -108,13 +112,13 @@ contains
                decay(i), modes%kind(i)
          end if
          if (.not. modes%is_stable(i)) line = trim(line)//', growing'
-         write (output_unit, '(a)') trim(line)
+         call print_line(trim(line))
       end do
-      if (modes%n > most_rows) write (output_unit, '(a, i0, a)') '   ... and ', modes%n - most_rows, ' more in the file'
+      if (modes%n > most_rows) call print_line('   ... and '//to_text(modes%n - most_rows)//' more in the file')
       if (all([(modes%is_stable(i), i=1, modes%n)])) then
-         write (output_unit, '(a)') 'stable  no mode grows'
+         call print_line('stable  no mode grows')
       else
-         write (output_unit, '(a, i0, a)') 'unstable  ', count([(.not. modes%is_stable(i), i=1, modes%n)]), ' of them grow'
+         call print_line('unstable  '//to_text(count([(.not. modes%is_stable(i), i=1, modes%n)]))//' of them grow')
       end if
    end subroutine print_table
 

@@ -1,8 +1,8 @@
 !> One case from its description to its HDF5 file: what `rodyn run` does, and what a library user may call.
 module rodyn_run
-   use, intrinsic :: iso_fortran_env, only: output_unit
    use rodyn_kinds, only: wp, i8
-   use rodyn_text, only: formatted
+   use rodyn_terminal, only: print_line
+   use rodyn_text, only: formatted, to_text
    use rodyn_errors, only: error_type, raise, exit_stopped
    use rodyn_case_config, only: case_config
    use rodyn_case_reader, only: resolved_case
@@ -90,8 +90,8 @@ contains
       if (allocated(error)) return
       header%notes = notes_on(scene, y(:scene%n_dof), config%output%ledger)
       if (.not. silent) then
-         write (output_unit, '(a)') describe_scene(scene, config%output%ledger)
-         write (output_unit, '(a)') 'method  '//driver%methods()//': '//driver%reason()
+         call print_line(describe_scene(scene, config%output%ledger))
+         call print_line('method  '//driver%methods()//': '//driver%reason())
          call print_lines('note   ', header%notes)
       end if
       call driver%make(error)
@@ -245,12 +245,12 @@ contains
 
       do i = 1, min(most_lines, motion%events%n_logged)
          associate (event => motion%events%log(i))
-            write (output_unit, '(a, i0, a)') 'event   t = '//time_text(event%time)//' s: hinge ', event%hinge, ' '// &
-               trim(kind_names(event%kind))//', '//formatted(event%energy_lost, '(es10.3)')//' J lost'
+            call print_line('event   t = '//time_text(event%time)//' s: hinge '//to_text(event%hinge)//' '// &
+               trim(kind_names(event%kind))//', '//formatted(event%energy_lost, '(es10.3)')//' J lost')
          end associate
       end do
-      if (motion%events%n_logged > most_lines) write (output_unit, '(a, i0, a)') 'event   and ', &
-         motion%events%n_logged - most_lines, ' more, all in the file'
+      if (motion%events%n_logged > most_lines) call print_line('event   and '// &
+         to_text(motion%events%n_logged - most_lines)//' more, all in the file')
    end subroutine print_events
 
    !> Each line of a text behind a word.
@@ -262,7 +262,7 @@ contains
       do while (first <= len(text))
          last = index(text(first:), new_line('a')) + first - 2
          if (last < first) last = len(text)
-         write (output_unit, '(a)') word//' '//text(first:last)
+         call print_line(word//' '//text(first:last))
          first = last + 2
       end do
    end subroutine print_lines
@@ -281,13 +281,13 @@ contains
       stats = driver%statistics()
       outcome = 'done'
       if (allocated(failure)) outcome = merge('stopped', 'failed ', failure%exit_code == exit_stopped)
-      write (output_unit, '(a, i0, a, i0, a)') outcome//'t = '//time_text(t)//' s, ', stats%n_steps, ' steps, ', &
-         stats%n_rhs, ' right-hand sides, '//formatted(seconds, '(f20.3)')//' s'
+      call print_line(outcome//'t = '//time_text(t)//' s, '//to_text(stats%n_steps)//' steps, '// &
+         to_text(stats%n_rhs)//' right-hand sides, '//formatted(seconds, '(f20.3)')//' s')
       call print_lines('method ', driver%history)
-      if (config%output%ledger) write (output_unit, '(a, es8.1, a, es8.1, a)') 'ledger  largest energy residual ', &
-         recorder%worst_residual, ' J of ', recorder%energy_scale, ' J'
+      if (config%output%ledger) call print_line('ledger  largest energy residual '// &
+         formatted(recorder%worst_residual, '(es8.1)')//' J of '//formatted(recorder%energy_scale, '(es8.1)')//' J')
       call print_lines('warning', recorder%validity%warnings())
-      write (output_unit, '(a)') 'file    '//path
+      call print_line('file    '//path)
    end subroutine print_result
 
 end module rodyn_run

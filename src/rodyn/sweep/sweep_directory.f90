@@ -59,6 +59,8 @@ contains
          return
       end if
       call open_lock(self%lock, path//'/lock', error)
+      if (self%lock%pretend .and. n_shards > 0) &
+         call raise(error, path//': shards need a file system with locks', exit_bad_input)
       if (allocated(error)) return
       call self%look()
       call lock_cases(self, shard, n_shards, error)
@@ -69,8 +71,9 @@ contains
    !> Keep others from looking around until `look_no_more`.
    subroutine look(self)
       class(sweep_directory), intent(inout) :: self
+      character(len=:), allocatable :: failure
       logical :: taken
-      if (self%looks == 0) taken = take_lock(self%lock, looking, 1_i8, wait=.true.)
+      if (self%looks == 0) call take_lock(self%lock, looking, 1_i8, .true., taken, failure)
       self%looks = self%looks + 1
    end subroutine look
 
@@ -86,26 +89,29 @@ contains
       integer, intent(in) :: shard, n_shards
       type(error_type), allocatable, intent(out) :: error
       integer(i8) :: base
+      character(len=:), allocatable :: failure
       integer :: holder
       logical :: taken
 
+      failure = ''
+      taken = .false.
       base = n_shards*per_count
       if (n_shards == 0) then
          holder = lock_holder(self%lock, whole, 0_i8)
-         taken = .false.
-         if (holder == 0) taken = take_lock(self%lock, whole, 1_i8, wait=.false.)
+         if (holder == 0) call take_lock(self%lock, whole, 1_i8, .false., taken, failure)
       else
          holder = lock_holder(self%lock, whole, base - whole)
          if (holder == 0) holder = lock_holder(self%lock, base + per_count, 0_i8)
          if (holder == 0) holder = lock_holder(self%lock, base + shard, 1_i8)
-         taken = .false.
-         if (holder == 0) taken = take_lock(self%lock, base + shard, 1_i8, wait=.false.)
+         if (holder == 0) call take_lock(self%lock, base + shard, 1_i8, .false., taken, failure)
       end if
       if (taken) return
       if (holder > 0) then
          call raise(error, self%path//': process '//to_text(holder)//' works on this sweep', exit_bad_input)
+      else if (len(failure) > 0) then
+         call raise(error, self%path//'/lock: cannot be locked: '//failure, exit_bad_input)
       else
-         call raise(error, self%path//': another process works on this sweep, or the file system has no locks', exit_bad_input)
+         call raise(error, self%path//': a process on another machine works on this sweep', exit_bad_input)
       end if
    end subroutine lock_cases
 
@@ -115,12 +121,16 @@ contains
       character(len=*), intent(in) :: path
       integer, intent(in) :: rank !! 1, 2, ...
       type(error_type), allocatable, intent(out) :: error
+      character(len=:), allocatable :: failure
+      logical :: taken
 
       self%path = path
       call open_lock(self%lock, path//'/lock', error)
       if (allocated(error)) return
-      if (.not. take_lock(self%lock, first_rank + rank, 1_i8, wait=.false.)) &
-         call raise(error, path//': another rank '//to_text(rank)//' works on this sweep', exit_bad_input)
+      call take_lock(self%lock, first_rank + rank, 1_i8, .false., taken, failure)
+      if (taken) return
+      if (len(failure) == 0) failure = 'another rank '//to_text(rank)//' works on this sweep'
+      call raise(error, path//': '//failure, exit_bad_input)
    end subroutine lock_rank
 
    !> Is the plan the one that is there? If none is there, it is written.

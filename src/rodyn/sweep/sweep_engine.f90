@@ -3,13 +3,12 @@
 !> All ways of sharing the work (one process, ranks of MPI, shards of a job array, any of them stopped and started again)
 !> leave the same shards but for their cut, and so the same `sweep.h5`.
 module rodyn_sweep_engine
-   use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type, raise, exit_bad_input, exit_done, exit_failed, exit_stopped
    use rodyn_input_texts, only: input_texts, read_input_texts
    use rodyn_lanes, only: lanes
    use rodyn_lapack, only: use_one_thread
-   use rodyn_posix, only: ignore_file_size_signal, path_exists
+   use rodyn_posix, only: ignore_signal, path_exists, sigxfsz
    use rodyn_posix_files, only: stop_signal, watch_signals, write_text_file
    use rodyn_run_needs, only: check_memory, memory_of_scene, of_program
    use rodyn_sweep_case, only: allocate_result, case_result, case_shape, new_case_shape, status_done, status_failed, status_stopped
@@ -25,7 +24,8 @@ module rodyn_sweep_engine
    use rodyn_sweep_result, only: result_is_sound, write_result
    use rodyn_sweep_worker, only: case_feed, lanes_text, run_cases, uses_lanes
    use rodyn_sweep_writer, only: shard_writer
-   use rodyn_text, only: as_utf8, to_text
+   use rodyn_terminal, only: print_error_line, print_line
+   use rodyn_text, only: as_utf8, formatted, to_text
    implicit none (type, external)
    private
    public :: run_sweep, sweep_options
@@ -103,7 +103,7 @@ contains
          return
       end if
       call watch_signals()
-      call ignore_file_size_signal()
+      call ignore_signal(sigxfsz)
       call open_sweep(engine, error)
       if (allocated(error)) return
       call compute(engine, error)
@@ -238,7 +238,7 @@ contains
          engine%tag = trim(number)
          call engine%directory%lock_rank(path, engine%ranks%rank, error)
          if (allocated(error)) then ! the other ranks must hear of it, or they would wait for this one
-            write (error_unit, '(a)') as_utf8(error%message)
+            call print_error_line(as_utf8(error%message))
             ignored = engine%ranks%add(at_errors, 1)
             deallocate (error)
             engine%todo = engine%todo(:0)
@@ -313,7 +313,7 @@ contains
       integer :: i
 
       do i = 1, notices%n
-         write (error_unit, '(a)') as_utf8(engine%options%output//': '//trim(notices%text(i)))
+         call print_error_line(as_utf8(engine%options%output//': '//trim(notices%text(i))))
       end do
       if (allocated(error)) return
       call engine%progress%start(status_name(engine), engine%options%quiet)
@@ -328,9 +328,8 @@ contains
       else
          line = line//'; one process'
       end if
-      write (output_unit, '(a)') 'sweep   '//line
-      write (output_unit, '(a)') 'lanes   '//lanes_text(engine%sweep, engine%plan)
-      flush (output_unit)
+      call print_line('sweep   '//line)
+      call print_line('lanes   '//lanes_text(engine%sweep, engine%plan))
    end subroutine tell_start
 
    function status_name(engine) result(path)
@@ -360,7 +359,7 @@ contains
       if (len(stop_signal()) > 0) ignored = engine%ranks%add(at_stopped, 1)
       if (allocated(error)) then
          ignored = engine%ranks%add(at_errors, 1)
-         if (engine%ranks%rank > 0) write (error_unit, '(a)') error%message
+         if (engine%ranks%rank > 0) call print_error_line(error%message)
       end if
       call share_counts(engine)
    end subroutine compute
@@ -459,9 +458,9 @@ contains
          call count_finished(engine, n_finished, error)
          if (.not. allocated(error) .and. n_finished < engine%options%n_shards) then
             call engine%progress%finish('done', engine%counts)
-            if (.not. engine%options%quiet) write (output_unit, '(a)') 'done    shard '//to_text(engine%options%shard)// &
+            if (.not. engine%options%quiet) call print_line('done    shard '//to_text(engine%options%shard)// &
                ': '//to_text(engine%counts%done)//' done, '//to_text(engine%counts%failed)//' failed; '// &
-               to_text(n_finished)//' of '//to_text(engine%options%n_shards)//' shards are complete'
+               to_text(n_finished)//' of '//to_text(engine%options%n_shards)//' shards are complete')
             call engine%directory%look_no_more()
             return
          end if
@@ -507,7 +506,7 @@ contains
                       notices, error)
       if (allocated(error)) return
       do i = 1, notices%n
-         write (error_unit, '(a)') engine%directory%path//': '//trim(notices%text(i))
+         call print_error_line(engine%directory%path//': '//trim(notices%text(i)))
       end do
       n_missing = 0
       do i = 1, engine%plan%n_cases
@@ -527,12 +526,12 @@ contains
          return
       end if
       if (size(engine%todo) == 0 .and. result_is_sound(path, index)) then
-         if (.not. engine%options%quiet) write (output_unit, '(a)') 'done    nothing to compute; '//path//' is complete, verified'
+         if (.not. engine%options%quiet) call print_line('done    nothing to compute; '//path//' is complete, verified')
       else
          call write_result(engine%directory%path, engine%tag, engine%sweep, engine%plan, engine%shape, index, aside, error)
          if (allocated(error)) return
-         if (size(engine%todo) == 0 .and. len(aside) > 0) write (error_unit, '(a)') path// &
-            ': not as it was merged from these results; set aside as '//aside//', merged again'
+         if (size(engine%todo) == 0 .and. len(aside) > 0) call print_error_line(path// &
+            ': not as it was merged from these results; set aside as '//aside//', merged again')
       end if
       exit_code = merge(exit_failed, exit_done, counts%failed > 0)
       call engine%progress%finish('done', counts)
@@ -563,9 +562,9 @@ contains
             if (shown > most_shown) exit
             call index%fetch(i, engine%shape, kept, error)
             if (allocated(error)) return
-            write (error_unit, '(a)') 'case '//to_text(i)//' failed: '//kept%message
+            call print_error_line('case '//to_text(i)//' failed: '//kept%message)
          end do
-         if (shown > most_shown) write (error_unit, '(a)') '...'
+         if (shown > most_shown) call print_error_line('...')
       end if
       do i = 1, size(engine%todo)
          call index%fetch(engine%todo(i), engine%shape, kept, error)
@@ -574,10 +573,11 @@ contains
       end do
       call system_clock(now, rate)
       wall = real(now - engine%progress%clock_start, wp)/real(rate, wp)
-      if (size(engine%todo) > 0) write (output_unit, '(a, f0.3, a, f0.3, a, i0, a)') 'cost    ', integration, &
-         ' s of integration in ', wall, ' s on ', engine%ranks%count, merge(' ranks  ', ' process', engine%ranks%count > 1)
-      write (output_unit, '(a)') 'cases   '//to_text(counts%done)//' done, '//to_text(counts%failed)//' failed'
-      write (output_unit, '(a)') 'file    '//engine%directory%path//'/'//result_name
+      if (size(engine%todo) > 0) call print_line('cost    '//formatted(integration, '(f20.3)')// &
+         ' s of integration in '//formatted(wall, '(f20.3)')//' s on '//to_text(engine%ranks%count)// &
+         trim(merge(' ranks  ', ' process', engine%ranks%count > 1)))
+      call print_line('cases   '//to_text(counts%done)//' done, '//to_text(counts%failed)//' failed')
+      call print_line('file    '//engine%directory%path//'/'//result_name)
    end subroutine tell_end
 
 end module rodyn_sweep_engine

@@ -1,6 +1,5 @@
 !> `rodyn sweep --dry-run`: the table of cases, and what they will cost in time and disk.
 module rodyn_sweep_forecast
-   use, intrinsic :: iso_fortran_env, only: output_unit
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type
    use rodyn_progress, only: duration_text
@@ -10,6 +9,7 @@ module rodyn_sweep_forecast
    use rodyn_sweep_plan, only: sweep_plan
    use rodyn_sweep_record, only: record_words
    use rodyn_sweep_worker, only: case_feed, lanes_text, run_cases, uses_lanes
+   use rodyn_terminal, only: print_line
    use rodyn_text, only: to_text, formatted
    implicit none (type, external)
    private
@@ -46,14 +46,14 @@ contains
 
       associate (unused => error); end associate
       n_computed = 0
-      write (output_unit, '(a)') header(sweep)
+      call print_line(header(sweep))
       do case = 1, plan%n_cases
          if (plan%same_as(case) == case) n_computed = n_computed + 1
-         if (case <= most_rows) write (output_unit, '(a)') table_row(sweep, plan, case)
+         if (case <= most_rows) call print_line(table_row(sweep, plan, case))
       end do
-      if (plan%n_cases > most_rows) write (output_unit, '(a)') '... and '//to_text(plan%n_cases - most_rows)//' more'
-      write (output_unit, '(a)') ''
-      write (output_unit, '(a)') 'cases   '//to_text(plan%n_cases)//', '//to_text(n_computed)//' to compute (equal ones once)'
+      if (plan%n_cases > most_rows) call print_line('... and '//to_text(plan%n_cases - most_rows)//' more')
+      call print_line('')
+      call print_line('cases   '//to_text(plan%n_cases)//', '//to_text(n_computed)//' to compute (equal ones once)')
       call print_time(sweep, plan, shape, n_computed)
       call print_disk(plan, shape, n_computed)
    end subroutine print_forecast
@@ -125,11 +125,11 @@ contains
          end do
       end if
       associate (mean => feed%total/max(1, feed%n_kept), cut => feed%cut)
-         write (output_unit, '(a)') 'lanes   '//lanes_text(sweep, plan)
-         write (output_unit, '(a)') 'time    about '//duration_text(mean*n_computed)//' on one core'// &
+         call print_line('lanes   '//lanes_text(sweep, plan))
+         call print_line('time    about '//duration_text(mean*n_computed)//' on one core'// &
             trim(merge(' or more', '        ', cut))//', by '//to_text(feed%n_kept)//' cases of '// &
             formatted(1000.0_wp*mean, '(f12.3)')//' ms on average'// &
-            trim(merge(' (some were cut short or failed)', '                                ', cut))
+            trim(merge(' (some were cut short or failed)', '                                ', cut)))
       end associate
    end subroutine print_time
 
@@ -140,8 +140,8 @@ contains
       integer, intent(in) :: n_computed
       real(wp) :: record
       record = 8.0_wp*record_words(shape, status_done, 0)
-      write (output_unit, '(a)') 'disk    about '//formatted(1.0e-6_wp*record*n_computed, '(f12.3)')//' MB of shards and '// &
-         formatted(1.0e-6_wp*record*plan%n_cases, '(f12.3)')//' MB of sweep.h5'
+      call print_line('disk    about '//formatted(1.0e-6_wp*record*n_computed, '(f12.3)')//' MB of shards and '// &
+         formatted(1.0e-6_wp*record*plan%n_cases, '(f12.3)')//' MB of sweep.h5')
    end subroutine print_disk
 
    subroutine beat(self, stop_now)

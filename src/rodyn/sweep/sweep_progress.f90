@@ -1,10 +1,10 @@
 !> How far a sweep has come: a line that is rewritten on a terminal, plain lines in a log, and a status file.
 module rodyn_sweep_progress
-   use, intrinsic :: iso_fortran_env, only: error_unit
    use rodyn_kinds, only: wp, i8
    use rodyn_posix, only: host_name, process_id, utc_now
    use rodyn_posix_files, only: write_text_file
    use rodyn_progress, only: duration_text, is_terminal
+   use rodyn_terminal, only: print_error_line, print_error_text
    use rodyn_text, only: to_text, formatted
    implicit none (type, external)
    private
@@ -62,12 +62,11 @@ contains
       line = sweep_line(counts, seconds(self%clock_start))
       if (self%terminal) then
          line = bar(counts)//' '//line
-         write (error_unit, '(3a)', advance='no') achar(13), line, repeat(' ', max(0, self%width - len(line)))
+         call print_error_text(achar(13)//line//repeat(' ', max(0, self%width - len(line))))
          self%width = len(line)
       else
-         write (error_unit, '(a)') line
+         call print_error_line(line)
       end if
-      flush (error_unit)
 
    contains
 
@@ -88,8 +87,7 @@ contains
       call system_clock(now, rate)
       call write_status(self, state, counts, real(now - self%clock_start, wp)/real(rate, wp))
       if (self%quiet .or. self%width == 0) return
-      write (error_unit, '(3a)', advance='no') achar(13), repeat(' ', self%width), achar(13)
-      flush (error_unit)
+      call print_error_text(achar(13)//repeat(' ', self%width)//achar(13))
       self%width = 0
    end subroutine finish
 
