@@ -6,6 +6,7 @@ RODYN=path  the program under test; otherwise bin/rodyn.
 import math
 import os
 import pathlib
+import re
 import resource
 import shutil
 import signal
@@ -13,6 +14,7 @@ import subprocess
 import sys
 import time
 
+import h5py
 import numpy as np
 import pytest
 import xarray
@@ -258,6 +260,75 @@ def test_a_failed_case_is_nan_and_alone(here):
     retried = sweep(here, None, "--retry-failed", code=1)
     assert "2 of them on the disk" in retried.stdout
     assert (here / "s" / "sweep-1.h5").exists()
+
+
+@pytest.mark.parametrize("method, keep_series, steps", [("dop853", ".true.", (20, 150, 300, 400)), ("bdf", ".false.", (200, 3000))])
+def test_a_failed_case_reached_the_last_row_of_its_run(here, method, keep_series, steps):
+    case = BASE.replace("n_outputs = 5", "n_outputs = 50").replace("&solver rtol = 1e-6, atol = 1e-8", f"&solver method = '{method}'")
+    (here / "base.nml").write_text(case)
+    sweep(here, f"&sweep base = 'base.nml', keep_series = {keep_series} /\n&axis key = 'solver.max_steps', values = "
+          + ", ".join(map(str, steps)) + " /\n", code=1)
+    data = opened(here)
+    assert list(data.status) == ["failed"] * len(steps)
+    for number, most in enumerate(steps):
+        (here / "one.nml").write_text(case.replace("&solver ", f"&solver max_steps = {most}, "))
+        subprocess.run([RODYN, "run", "one.nml", "--force", "--quiet"], cwd=here, capture_output=True)
+        with h5py.File(here / "one.h5") as run:
+            assert data.t_reached[number] == run.attrs["t_reached"] == run["time"][-1], most
+    assert np.all(np.diff(data.t_reached) > 0)
+
+
+def test_compression_is_that_of_the_base(here):
+    (here / "base.nml").write_text(BASE + "&output compression = 0 /\n")
+    sweep(here, GRID)
+    sweep(here, GRID, name="again")
+    assert content(here / "s") == content(here / "again")
+    with h5py.File(here / "s" / "sweep.h5") as file:
+        assert {name: data.compression for name, data in file.items()} == dict.fromkeys(file, None)
+    (here / "base.nml").write_text(BASE + "&output compression = 9 /\n")
+    sweep(here, GRID, name="small")
+    with h5py.File(here / "small" / "sweep.h5") as file:
+        assert {data.compression_opts for data in file.values()} == {9}
+
+
+def test_octave_reads_everything(here):
+    """All kinds of files: Octave's load stops at the first thing that it does not know, and loses what follows."""
+    (here / "base.nml").write_text(BASE + "&hinge hinge = 1, lower_stop = -0.01, upper_stop = 0.01, stop_stiffness = 1e5 /\n")
+    for command in ("run", "modes"):
+        subprocess.run([RODYN, command, "base.nml", "--output", f"{command}.h5", "--quiet"], cwd=here, check=True)
+    sweep(here, "&sweep base = 'base.nml', probe_times = 0.05, keep_series = .true., frequencies = 3 /\n"
+          "&axis key = 'solver.method', text_values = 'dop853', 'erk' /\n&axis key = 'solver.max_steps', values = 20, 10000 /\n", code=1)
+    for path in ("run.h5", "modes.h5", "s/sweep.h5"):
+        done = subprocess.run(["octave-cli", "--no-init-file", "--no-gui", "--quiet", "--eval", OCTAVE.replace("FILE", path)], cwd=here,
+                              capture_output=True, text=True)
+        assert "warning: load" not in done.stderr, done.stderr
+        seen = dict(line.split("=", 1) for line in done.stdout.splitlines() if "=" in line)
+        with h5py.File(here / path) as file:
+            names = []
+            file.visititems(lambda name, item, names=names: names.append(name) if isinstance(item, h5py.Dataset) else None)
+            assert set(seen) == {re.sub(r"[.()]", "_", name) for name in names}
+            for name in ("events/kind", "kind", "coordinate", "status", "message", "param_solver.method"):
+                if name in file:
+                    texts = [text.decode() for text in file[name][()]]
+                    assert [text.strip() for text in seen[name.replace(".", "_")].split("|")] == texts, name
+
+
+OCTAVE = """
+function tell(prefix, s)
+   names = fieldnames(s);
+   for i = 1:numel(names)
+      x = s.(names{i});
+      if isstruct(x)
+         tell([prefix names{i} '/'], x);
+      elseif ischar(x)
+         printf('%s%s=%s\\n', prefix, names{i}, strjoin(cellstr(x)', '|'));
+      else
+         printf('%s%s=%d\\n', prefix, names{i}, numel(x));
+      end
+   end
+end
+tell('', load('-hdf5', 'FILE'));
+"""
 
 
 def test_a_case_over_its_wall_limit_fails_alone_and_can_be_retried(here):

@@ -5,7 +5,7 @@
 !> Files are readable by HDF5 1.8 and later and carry no time stamps: equal contents are equal bytes.
 !> A failed library call becomes a message with the call, the object, the path and the library's own reason.
 module rodyn_hdf5_files
-   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_funloc, c_funptr, c_int, c_int64_t, c_loc, &
+   use, intrinsic :: iso_c_binding, only: c_associated, c_bool, c_char, c_f_pointer, c_funloc, c_funptr, c_int, c_int64_t, c_loc, &
       c_null_char, c_ptr, c_size_t
    use, intrinsic :: iso_fortran_env, only: int32, int64
    use hdf5, only: hid_t, hsize_t, size_t, h5dont_atexit_f, h5open_f, h5get_libversion_f, h5eset_auto_f, &
@@ -20,8 +20,9 @@ module rodyn_hdf5_files
       h5sget_simple_extent_npoints_f, &
       h5tcopy_f, h5tclose_f, h5tset_size_f, h5tset_strpad_f, h5tset_cset_f, h5tget_size_f, h5tget_class_f, h5t_string_f, &
       h5tis_variable_str_f, &
-      h5t_str_nullpad_f, h5t_cset_utf8_f, h5t_fortran_s1, h5t_ieee_f64le, h5t_std_i32le, h5t_std_i64le, &
-      h5t_native_double, h5t_string, h5kind_to_type, h5_integer_kind, &
+      h5t_str_nullpad_f, h5t_str_spacepad_f, h5t_cset_ascii_f, h5t_cset_utf8_f, &
+      h5t_fortran_s1, h5t_ieee_f64le, h5t_std_i32le, h5t_std_i64le, &
+      h5t_native_double, h5kind_to_type, h5_integer_kind, &
       h5dcreate_f, h5dopen_f, h5dclose_f, h5dwrite_f, h5dread_f, h5dset_extent_f, h5dget_space_f, &
       h5acreate_by_name_f, h5aopen_by_name_f, h5aexists_by_name_f, h5adelete_by_name_f, h5aclose_f, h5awrite_f, &
       h5aread_f, h5aget_type_f, h5aget_space_f
@@ -48,6 +49,7 @@ module rodyn_hdf5_files
       procedure :: close => close_file
       procedure :: create_group
       procedure :: create_series
+      procedure :: create_texts
       generic :: append => append_1, append_2, append_3, append_int64, append_texts
       generic :: write => write_integer_1, write_real_1, write_real_2, write_real_3
       procedure :: make_scale
@@ -90,6 +92,16 @@ module rodyn_hdf5_files
          type(c_ptr), value :: client_data
          integer(c_int) :: status
       end function h5ewalk2
+
+      ! not in the Fortran interface of HDF5 1.10
+      function h5pset_file_locking(access_list, use_locks, ignore_when_disabled) result(status) &
+         bind(c, name='H5Pset_file_locking')
+         import :: c_bool, c_int, c_int64_t
+         implicit none (type, external)
+         integer(c_int64_t), value :: access_list
+         logical(c_bool), value :: use_locks, ignore_when_disabled
+         integer(c_int) :: status
+      end function h5pset_file_locking
 
       function c_strlen(text) result(length) bind(c, name='strlen')
          import :: c_ptr, c_size_t
@@ -197,31 +209,54 @@ contains
       call h5pclose_f(creation_list, status)
    end subroutine create_group
 
-   !> Make an empty real data set that grows along its last dimension, time. It is chunked, compressed and
-   !> checksummed; blocks of `chunk_rows` rows are written fastest.
-   subroutine create_series(self, name, row_shape, chunk_rows, compression, error, kind_of)
+   !> Make an empty data set of numbers that grows along its last dimension, time.
+   subroutine create_series(self, name, row_shape, chunk_rows, compression, error, whole)
       class(hdf5_file), intent(in) :: self
       character(len=*), intent(in) :: name
       integer, intent(in) :: row_shape(:) !! shape of one row; empty: one number per time
-      integer, intent(in) :: chunk_rows   !! rows per chunk, >= 1
+      integer, intent(in) :: chunk_rows   !! rows per chunk, >= 1; blocks of as many are written fastest
       integer, intent(in) :: compression  !! gzip level, 0..9
       type(error_type), allocatable, intent(out) :: error
-      character(len=*), intent(in), optional :: kind_of !! 'real' (default), 'integer' of 64 bits, or 'text'
-      integer(hsize_t) :: extent(size(row_shape) + 1)
-      integer(hid_t) :: file_type, set
-      integer :: status
+      logical, intent(in), optional :: whole !! integers of 64 bits
+      integer(hid_t) :: file_type
 
       file_type = h5t_ieee_f64le
-      if (present(kind_of)) then
-         if (kind_of == 'integer') file_type = h5t_std_i64le
-         if (kind_of == 'text') file_type = utf8_text()
-      end if
-      extent = int([row_shape, 0], hsize_t)
-      call new_dataset(self, name, file_type, extent, int([row_shape, chunk_rows], hsize_t), .true., compression, set, error)
+      if (present(whole)) file_type = merge(h5t_std_i64le, h5t_ieee_f64le, whole)
+      call new_series(self, name, file_type, row_shape, chunk_rows, compression, error)
+   end subroutine create_series
+
+   !> Make an empty series of texts, one per time. They have one length in the file, or Octave could not read them, nor
+   !> filters reach them; and they are called ASCII, whatever they are, as Octave wants it. The attribute is xarray's.
+   subroutine create_texts(self, name, length, chunk_rows, compression, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer, intent(in) :: length       !! of the longest [bytes]
+      integer, intent(in) :: chunk_rows, compression !! as in `create_series`
+      type(error_type), allocatable, intent(out) :: error
+      integer(hid_t) :: file_type
+      integer :: status
+
+      file_type = text_type(length, h5t_str_nullpad_f, h5t_cset_ascii_f)
+      call new_series(self, name, file_type, [integer ::], chunk_rows, compression, error)
+      call h5tclose_f(file_type, status)
+      if (.not. allocated(error)) call self%put_attribute(name, '_Encoding', 'utf-8', error)
+   end subroutine create_texts
+
+   subroutine new_series(self, name, file_type, row_shape, chunk_rows, compression, error)
+      class(hdf5_file), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer(hid_t), intent(in) :: file_type
+      integer, intent(in) :: row_shape(:), chunk_rows, compression
+      type(error_type), allocatable, intent(out) :: error
+      integer(hid_t) :: set
+      integer :: status
+
+      call new_dataset(self, name, file_type, int([row_shape, 0], hsize_t), int([row_shape, chunk_rows], hsize_t), .true., &
+                       compression, set, error)
       if (allocated(error)) return
       call h5dclose_f(set, status)
       if (self%failed(status, 'h5dclose_f', name, error)) return
-   end subroutine create_series
+   end subroutine new_series
 
    !> Append numbers, one per time, to a series.
    subroutine append_1(self, name, values, error)
@@ -263,35 +298,36 @@ contains
       call self%append_block(name, h5kind_to_type(int64, h5_integer_kind), c_loc(values), int(shape(values), hsize_t), error)
    end subroutine append_int64
 
-   !> Append texts, of any length, to a series of texts.
+   !> Append texts to a series of texts.
    subroutine append_texts(self, name, values, error)
       class(hdf5_file), intent(in) :: self
       character(len=*), intent(in) :: name
       character(len=*), intent(in) :: values(:) !! trailing blanks do not count
       type(error_type), allocatable, intent(out) :: error
-      character(kind=c_char, len=len(values) + 1), allocatable, target :: texts(:)
-      type(c_ptr), allocatable, target :: pointers(:)
+      character(len=max(1, len(values))), allocatable, target :: texts(:)
       integer(hid_t) :: memory_type
-      integer :: i, status
+      integer :: status
 
       if (size(values) == 0) return
-      allocate (texts(size(values)), pointers(size(values)))
-      do i = 1, size(values)
-         texts(i) = trim(values(i))//c_null_char
-         pointers(i) = c_loc(texts(i))
-      end do
-      memory_type = utf8_text()
-      call self%append_block(name, memory_type, c_loc(pointers), [size(values, kind=hsize_t)], error)
+      allocate (texts(size(values)))
+      texts(:) = values
+      memory_type = text_type(len(texts), h5t_str_spacepad_f, h5t_cset_ascii_f)
+      call self%append_block(name, memory_type, c_loc(texts), [size(values, kind=hsize_t)], error)
       call h5tclose_f(memory_type, status)
    end subroutine append_texts
 
-   !> The type of texts of any length.
-   function utf8_text() result(text_type)
+   !> The type of texts of one length.
+   function text_type(length, padding, characters)
+      integer, intent(in) :: length  !! [bytes]; 0: one null
+      integer, intent(in) :: padding !! what fills it up
+      integer, intent(in) :: characters !! their set
       integer(hid_t) :: text_type
       integer :: status
-      call h5tcopy_f(h5t_string, text_type, status)
-      call h5tset_cset_f(text_type, h5t_cset_utf8_f, status)
-   end function utf8_text
+      call h5tcopy_f(h5t_fortran_s1, text_type, status)
+      call h5tset_size_f(text_type, int(max(1, length), size_t), status)
+      call h5tset_strpad_f(text_type, padding, status)
+      call h5tset_cset_f(text_type, characters, status)
+   end function text_type
 
    !> Extend a data set along its last dimension and fill the new part.
    subroutine append_block(self, name, memory_type, values, counts, error)
@@ -408,7 +444,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       integer(hsize_t) :: most(size(extent))
       integer(hid_t) :: space, creation_list
-      integer :: class, status
+      integer :: status
 
       set = -1_hid_t
       most = extent
@@ -420,12 +456,6 @@ contains
          call h5pset_obj_track_times_f(creation_list, .false., status)
          call h5pset_chunk_f(creation_list, size(chunk), chunk, status)
          if (self%failed(status, 'h5pset_chunk_f', name, error)) exit work
-         call h5tget_class_f(file_type, class, status)
-         if (class == h5t_string_f) then ! texts of any length stand elsewhere in the file, filters cannot reach them
-            call h5dcreate_f(self%id, name, file_type, space, set, status, dcpl_id=creation_list)
-            if (self%failed(status, 'h5dcreate_f', name, error)) exit work
-            exit work
-         end if
          if (compression > 0) then
             call h5pset_shuffle_f(creation_list, status)
             if (self%failed(status, 'h5pset_shuffle_f', name, error)) exit work
@@ -489,25 +519,21 @@ contains
       character(len=*), intent(in) :: name
       character(len=*), intent(in) :: value
       type(error_type), allocatable, intent(out) :: error
-      integer(hid_t) :: text_type, attribute
+      integer(hid_t) :: value_type, attribute
       integer :: status
 
-      call h5tcopy_f(h5t_fortran_s1, text_type, status)
-      if (self%failed(status, 'h5tcopy_f', object//'@'//name, error)) return
-      call h5tset_size_f(text_type, int(max(1, len(value)), size_t), status)
-      call h5tset_strpad_f(text_type, h5t_str_nullpad_f, status)
-      call h5tset_cset_f(text_type, h5t_cset_utf8_f, status)
-      call new_attribute(self, object, name, text_type, attribute, error)
+      value_type = text_type(len(value), h5t_str_nullpad_f, h5t_cset_utf8_f)
+      call new_attribute(self, object, name, value_type, attribute, error)
       if (.not. allocated(error)) then
          if (len(value) > 0) then
-            call h5awrite_f(attribute, text_type, value, [1_hsize_t], status)
+            call h5awrite_f(attribute, value_type, value, [1_hsize_t], status)
          else
-            call h5awrite_f(attribute, text_type, achar(0), [1_hsize_t], status)
+            call h5awrite_f(attribute, value_type, achar(0), [1_hsize_t], status)
          end if
          if (self%failed(status, 'h5awrite_f', object//'@'//name, error)) continue
          call h5aclose_f(attribute, status)
       end if
-      call h5tclose_f(text_type, status)
+      call h5tclose_f(value_type, status)
    end subroutine put_text
 
    subroutine put_real(self, object, name, value, error)
@@ -862,8 +888,9 @@ contains
       started = .true.
    end subroutine start_library
 
-   !> Access properties of every file: format of HDF5 1.8 (attributes beyond 64 KiB, checksummed metadata), and
-   !> closing the file closes all that failed calls left open.
+   !> Access properties of every file: format of HDF5 1.8 (attributes beyond 64 KiB, checksummed metadata), closing the
+   !> file closes all that failed calls left open, and no locks. A file being written has a name of its own, so that nobody
+   !> else writes it, anybody may look at it, and file systems without locks will do.
    subroutine new_access_list(access_list)
       integer(hid_t), intent(out) :: access_list
       integer :: status
@@ -871,6 +898,7 @@ contains
       call h5pcreate_f(h5p_file_access_f, access_list, status)
       call h5pset_libver_bounds_f(access_list, h5f_libver_v18_f, h5f_libver_v18_f, status)
       call h5pset_fclose_degree_f(access_list, h5f_close_strong_f, status)
+      status = h5pset_file_locking(access_list, .false._c_bool, .true._c_bool)
    end subroutine new_access_list
 
    !> Did a library call fail? If so, `error` names the call, the object, the path and the reason. To be called
@@ -895,6 +923,7 @@ contains
       character(kind=c_char, len=512), target :: buffer
       integer(c_int) :: status
       integer :: first, length
+      logical :: no_lock
 
       buffer = ' '
       status = h5ewalk2(0_c_int64_t, 0_c_int, c_funloc(keep_first_record), c_loc(buffer))
@@ -904,9 +933,11 @@ contains
       ! of a failed system call only its reason is of use
       first = index(text, mark)
       if (first == 0) return
+      no_lock = index(text, 'unable to lock file') == 1 .and. index(text, 'errno = 11,') == 0 ! EAGAIN: another has it
       first = first + len(mark)
       length = index(text(first:), "'") - 1
       if (length > 0) text = text(first:first + length - 1)
+      if (no_lock) text = text//' (the file system has no locks: set HDF5_USE_FILE_LOCKING=FALSE)'
    end function library_reason
 
    !> Copy the description of the innermost record of the error stack and end the walk.

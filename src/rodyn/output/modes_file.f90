@@ -74,7 +74,7 @@ contains
       subroutine names(name, values, long_name)
          character(len=*), intent(in) :: name, values(:), long_name
          if (allocated(error)) return
-         call file%file%create_series(name, [integer ::], size(values), compression, error, 'text')
+         call file%file%create_texts(name, len(values), size(values), compression, error)
          if (.not. allocated(error)) call file%file%append(name, values, error)
          if (.not. allocated(error)) call file%file%put_attribute(name, 'long_name', long_name, error)
          if (.not. allocated(error)) call file%file%make_scale(name, error)
@@ -87,7 +87,7 @@ contains
          call per_mode('damping_ratio', modes%damping_ratio(), '1', 'decay over natural frequency; -1 or 1 of relaxations')
          call per_mode('decay', modes%decay(), 's-1', 'rate of decay, minus the real part; negative: it grows')
          if (allocated(error)) return
-         call file%file%create_series('kind', [integer ::], modes%n, compression, error, 'text')
+         call file%file%create_texts('kind', len(modes%kind), modes%n, compression, error)
          if (.not. allocated(error)) call file%file%append('kind', modes%kind, error)
          if (.not. allocated(error)) call file%file%put_attribute('kind', 'long_name', &
             'rigid body, mechanism, oscillation or relaxation', error)

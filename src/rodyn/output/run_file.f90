@@ -266,7 +266,7 @@ contains
       if (.not. allocated(error)) call self%file%write('events/time', time, 0, error)
       if (.not. allocated(error)) call self%file%make_scale('events/time', error)
       if (.not. allocated(error)) call self%file%write('events/hinge', hinge, 0, error)
-      if (.not. allocated(error)) call self%file%create_series('events/kind', [integer ::], max(1, size(kind)), 0, error, 'text')
+      if (.not. allocated(error)) call self%file%create_texts('events/kind', len(kind), max(1, size(kind)), 0, error)
       if (.not. allocated(error)) call self%file%append('events/kind', kind, error)
       if (.not. allocated(error)) call self%file%write('events/energy_lost', energy_lost, 0, error)
       do i = 1, size(names)

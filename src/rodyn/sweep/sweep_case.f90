@@ -53,7 +53,7 @@ module rodyn_sweep_case
       integer :: status = status_stopped
       integer :: attempt = 1                  !! 2, 3, ...: after --retry-failed
       integer(i8) :: n_steps = 0, n_rhs = 0
-      real(wp) :: t_reached = 0.0_wp          !! last good time [s]
+      real(wp) :: t_reached = 0.0_wp          !! end of the case; of a failed one the last output time before it failed [s]
       real(wp) :: wall_seconds = 0.0_wp       !! whole case
       real(wp) :: integration_seconds = 0.0_wp !! of them, inside the integration
       character(len=:), allocatable :: message
@@ -99,6 +99,8 @@ module rodyn_sweep_case
       integer, allocatable :: output_of(:)   !! row of the series of each time; 0: none
       logical :: keep_series = .false.
       integer :: seen = 0                    !! times so far
+      real(wp) :: t_end = 0.0_wp             !! of the case [s]
+      integer :: n_outputs = 1               !! of the case, intervals from 0 to t_end
       type(validity_type) :: validity
       type(case_result), pointer :: kept => null()
    contains
@@ -287,6 +289,8 @@ contains
       keeper%row = new_run_row(scene%n)
       keeper%validity = new_validity(scene, config%model%deflection_limit)
       keeper%n_rods = shape%n_rods
+      keeper%t_end = t_end
+      keeper%n_outputs = config%n_outputs
       keeper%keep_series = sweep%keep_series
    end subroutine prepare_case
 
@@ -390,8 +394,9 @@ contains
    end function in_one_line
 
    !> Status and message of a case that has ended. Nothing that happens to a case is an error of the sweep.
-   subroutine conclude_case(sweep, late, error, kept)
+   subroutine conclude_case(sweep, keeper, late, error, kept)
       type(sweep_config), intent(in) :: sweep
+      type(keeper_type), intent(in) :: keeper
       logical, intent(in) :: late
       type(error_type), allocatable, intent(in) :: error
       type(case_result), intent(inout) :: kept
@@ -399,6 +404,7 @@ contains
       kept%status = status_done
       if (.not. allocated(error)) return
       kept%status = status_failed
+      kept%t_reached = last_row(keeper, kept%t_reached)
       kept%message = error%message
       if (late) then
          kept%message = 'case_seconds = '//short_text(sweep%case_seconds)//' s exceeded'
@@ -407,6 +413,26 @@ contains
       end if
       call make_nan(kept)
    end subroutine conclude_case
+
+   !> Time of the last row a run of this case would have: that of its last output [s].
+   pure real(wp) function last_row(keeper, t)
+      type(keeper_type), intent(in) :: keeper
+      real(wp), intent(in) :: t !! last good time [s]
+      integer :: k
+
+      last_row = 0.0_wp
+      if (.not. keeper%t_end > 0.0_wp) return ! it failed before it began
+      associate (t_end => keeper%t_end, n => keeper%n_outputs)
+         if (allocated(keeper%output_of) .and. keeper%keep_series) then
+            k = max(1, maxval(keeper%output_of(:keeper%seen))) - 1
+         else
+            k = min(n, int(t/t_end*n) + 1)
+            if (t_end*(real(k, wp)/n) > t) k = k - 1
+            if (t_end*(real(k, wp)/n) > t) k = k - 1
+         end if
+         last_row = t_end*(real(k, wp)/n)
+      end associate
+   end function last_row
 
    !> The times at which states are wanted, in order: probes up to the end of the case, and outputs.
    subroutine merge_times(config, probe_times, outputs, times, probe_of, output_of)
@@ -455,13 +481,13 @@ contains
       type(error_type), allocatable, intent(out) :: error
       integer :: probe, output
 
-      self%seen = self%seen + 1
-      probe = self%probe_of(self%seen)
-      output = self%output_of(self%seen)
       if (.not. all(abs(y) <= huge(y))) then
          call raise(error, 'the state is not finite')
          return
       end if
+      self%seen = self%seen + 1
+      probe = self%probe_of(self%seen)
+      output = self%output_of(self%seen)
       if (probe == 0 .and. .not. self%keep_series) return
       call fill_row(motion, t, y, 0.0_wp, self%row)
       call self%validity%observe(self%row)

@@ -9,7 +9,7 @@ module rodyn_sweep_index
    use rodyn_sweep_journal, only: journal_content, read_journals, write_journal
    use rodyn_sweep_mend, only: mend_shard
    use rodyn_sweep_notices, only: notice_list
-   use rodyn_sweep_record, only: at_attempt, at_case, at_status, decode_record, is_sound, shortest_record
+   use rodyn_sweep_record, only: at_attempt, at_case, at_message, at_status, decode_record, is_sound, shortest_record
    use rodyn_sweep_shard, only: header_words, shard_extent, sift_shard
    use rodyn_sweep_writer, only: open_ending
    use rodyn_text, only: ends_with, to_text
@@ -25,6 +25,7 @@ module rodyn_sweep_index
       character(len=name_length), allocatable :: files(:)
       integer, allocatable :: status(:)       !! of each case; 0: no result
       integer, allocatable :: attempt(:)      !! of each case
+      integer, allocatable :: message_bytes(:) !! of each case
       integer, allocatable, private :: file(:)    !! which file has the result
       integer(i8), allocatable, private :: at(:)  !! where: first byte
       integer, allocatable, private :: units(:)   !! of each file; 0: closed
@@ -131,8 +132,9 @@ contains
    subroutine forget(self, n_cases)
       class(sweep_index), intent(inout) :: self
       integer, intent(in) :: n_cases
-      if (allocated(self%status)) deallocate (self%status, self%attempt, self%file, self%at, self%files, self%units)
-      allocate (self%status(n_cases), self%attempt(n_cases), self%file(n_cases), source=0)
+      if (allocated(self%status)) &
+         deallocate (self%status, self%attempt, self%message_bytes, self%file, self%at, self%files, self%units)
+      allocate (self%status(n_cases), self%attempt(n_cases), self%message_bytes(n_cases), self%file(n_cases), source=0)
       allocate (self%at(n_cases), source=0_i8)
       self%bytes = 0
    end subroutine forget
@@ -186,6 +188,7 @@ contains
          if (attempt >= self%attempt(case)) then
             self%attempt(case) = attempt
             self%status(case) = int(words(at + at_status))
+            self%message_bytes(case) = int(words(at + at_message))
             self%file(case) = file
             self%at(case) = 8*(at - 1) + 1
          end if

@@ -9,7 +9,7 @@ module rodyn_sweep_merge
    use rodyn_errors, only: error_type, raise
    use rodyn_hdf5_files, only: hdf5_file, hdf5_version
    use rodyn_integrators, only: sundials_version
-   use rodyn_posix, only: ignore_file_size_signal, path_exists, remove_file, sync_path
+   use rodyn_posix, only: ignore_signal, path_exists, remove_file, sigxfsz, sync_path
    use rodyn_run_layout, only: i_alpha, i_alpha_rate, i_beta, i_beta_rate, i_bubble, i_bubble_rate, i_displacement_x, &
       i_displacement_y, i_omega, i_phi, i_phi_rate, i_rotation, i_velocity_x, i_velocity_y, run_variables
    use rodyn_sweep_case, only: allocate_result, case_result, case_shape, status_done
@@ -26,8 +26,7 @@ module rodyn_sweep_merge
    integer, parameter :: scalars(6) = [i_velocity_x, i_velocity_y, i_omega, i_displacement_x, i_displacement_y, i_rotation]
    integer, parameter :: block_bytes = 4*1024*1024 !! memory for the states of a block of cases
    integer, parameter :: most_block_cases = 4096
-   integer, parameter :: compression = 4
-   integer, parameter :: message_length = 1000
+   integer, parameter :: longest_message = 1000 !! [bytes]
 
    !> Results of consecutive cases
    type :: case_block
@@ -40,7 +39,7 @@ module rodyn_sweep_merge
       real(wp), allocatable :: t_reached(:), wall_seconds(:)
       integer(i8), allocatable :: n_steps(:), n_rhs(:), same_as(:), number(:)
       character(len=8), allocatable :: status(:)
-      character(len=message_length), allocatable :: message(:)
+      character(len=:), allocatable :: message(:)
    end type case_block
 
 contains
@@ -57,7 +56,7 @@ contains
       type(hdf5_file) :: file
       character(len=:), allocatable :: failure
 
-      call ignore_file_size_signal()
+      call ignore_signal(sigxfsz)
       if (path_exists(path)) failure = remove_file(path)
       call file%create(path, error)
       if (allocated(error)) return
@@ -88,13 +87,14 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(case_block) :: block
       type(case_result) :: kept
-      integer :: block_cases, first, n
+      integer :: block_cases, first, message_length, n
 
       block_cases = cases_per_block(shape, plan%n_cases)
+      message_length = min(longest_message, maxval(index%message_bytes))
       call write_header(file, sweep, plan, error)
-      if (.not. allocated(error)) call write_layout(file, sweep, shape, block_cases, error)
+      if (.not. allocated(error)) call write_layout(file, sweep, shape, block_cases, message_length, error)
       if (allocated(error)) return
-      call new_block(block, kept, shape, block_cases)
+      call new_block(block, kept, shape, block_cases, message_length)
       do first = 1, plan%n_cases, block_cases
          n = min(block_cases, plan%n_cases - first + 1)
          call fill_block(block, kept, plan, shape, index, first, n, error)
@@ -114,17 +114,18 @@ contains
       n = max(1, min(n_cases, most_block_cases, block_bytes/(8*numbers)))
    end function cases_per_block
 
-   subroutine new_block(block, kept, shape, n)
+   subroutine new_block(block, kept, shape, n, message_length)
       type(case_block), intent(out) :: block
       type(case_result), intent(out) :: kept
       type(case_shape), intent(in) :: shape
-      integer, intent(in) :: n
+      integer, intent(in) :: n, message_length
       allocate (block%frequency(shape%n_modes, n), block%damping_ratio(shape%n_modes, n))
       allocate (block%final(shape%n_states, n), block%probes(shape%n_states, shape%n_probes, n))
       allocate (block%times(shape%n_rows, n), block%series(shape%n_states, shape%n_rows, n))
       allocate (block%t_reached(n), block%wall_seconds(n))
       allocate (block%n_steps(n), block%n_rhs(n), block%same_as(n), block%number(n))
-      allocate (block%status(n), block%message(n))
+      allocate (block%status(n))
+      allocate (character(len=message_length) :: block%message(n))
       call allocate_result(kept, shape)
    end subroutine new_block
 
@@ -201,14 +202,16 @@ contains
    end subroutine write_header
 
    !> All data sets that grow with the cases, empty; coordinates.
-   subroutine write_layout(file, sweep, shape, block_cases, error)
+   subroutine write_layout(file, sweep, shape, block_cases, message_length, error)
       type(hdf5_file), intent(in) :: file
       type(sweep_config), intent(in) :: sweep
       type(case_shape), intent(in) :: shape
-      integer, intent(in) :: block_cases
+      integer, intent(in) :: block_cases, message_length
       type(error_type), allocatable, intent(out) :: error
       character(len=:), allocatable :: state
-      integer :: a, i
+      integer :: a, compression, i
+
+      compression = sweep%base_case%output%compression
 
       if (shape%n_states > 0) then
          call file%write('probe_time', sweep%probe_times, compression, error)
@@ -227,15 +230,15 @@ contains
       call make('case', [integer ::], 'integer', '1', 'case; the last axis runs fastest')
       do a = 1, size(sweep%axes)
          if (sweep%axes(a)%textual) then
-            call make(parameter_name(a), [integer ::], 'text', '', 'value of '//trim(sweep%axes(a)%key))
+            call make_texts(parameter_name(a), maxval(len_trim(sweep%axes(a)%texts)), 'value of '//trim(sweep%axes(a)%key))
          else
             call make(parameter_name(a), [integer ::], 'real', unit_or_one(sweep%axes(a)%unit), &
                       'value of '//trim(sweep%axes(a)%key))
          end if
       end do
-      call make('status', [integer ::], 'text', '', 'done or failed')
-      call make('message', [integer ::], 'text', '', 'why the case failed, or warnings on its model')
-      call make('t_reached', [integer ::], 'real', 's', 'last good time; of a done case its end')
+      call make_texts('status', len('failed'), 'done or failed')
+      call make_texts('message', message_length, 'why the case failed, or warnings on its model')
+      call make('t_reached', [integer ::], 'real', 's', 'time of the last output before it failed; of a done case its end')
       call make('n_steps', [integer ::], 'integer', '1', 'internal steps')
       call make('n_rhs', [integer ::], 'integer', '1', 'right-hand sides')
       call make('same_as', [integer ::], 'integer', '1', 'first case with the same values, the one that was computed')
@@ -280,9 +283,16 @@ contains
       subroutine make(name, row, kind_of, units, long_name)
          character(len=*), intent(in) :: name, kind_of, units, long_name
          integer, intent(in) :: row(:)
-         if (.not. allocated(error)) call file%create_series(name, row, block_cases, compression, error, kind_of)
+         if (.not. allocated(error)) call file%create_series(name, row, block_cases, compression, error, kind_of == 'integer')
          call describe(name, units, long_name)
       end subroutine make
+
+      subroutine make_texts(name, length, long_name)
+         character(len=*), intent(in) :: name, long_name
+         integer, intent(in) :: length
+         if (.not. allocated(error)) call file%create_texts(name, length, block_cases, compression, error)
+         call describe(name, '', long_name)
+      end subroutine make_texts
 
       subroutine describe(name, units, long_name)
          character(len=*), intent(in) :: name, units, long_name

@@ -10,10 +10,10 @@ module rodyn_sweep_record
    implicit none (type, external)
    private
    public :: record_words, encode_record, decode_record, is_sound, fits_sweep
-   public :: shortest_record, at_case, at_status, at_attempt
+   public :: shortest_record, at_case, at_status, at_attempt, at_message
 
-   integer, parameter :: at_case = 1, at_status = 2, at_attempt = 3 !! words behind the first of a record
-   integer, parameter :: fixed_words = 10, message_at = 9
+   integer, parameter :: at_case = 1, at_status = 2, at_attempt = 3, at_message = 9 !! words behind the first of a record
+   integer, parameter :: fixed_words = 10
    integer, parameter :: shortest_record = fixed_words + 1
 
 contains
@@ -45,7 +45,7 @@ contains
       words(7) = transfer(kept%t_reached, 0_i8)
       words(8) = transfer(kept%wall_seconds, 0_i8)
       words(9) = transfer(kept%integration_seconds, 0_i8)
-      words(1 + message_at) = len(kept%message)
+      words(1 + at_message) = len(kept%message)
       at = fixed_words + 1
       do i = 1, len(kept%message), 8
          words(at) = packed(kept%message(i:min(i + 7, len(kept%message))))
@@ -93,7 +93,7 @@ contains
       kept%t_reached = transfer(words(7), 0.0_wp)
       kept%wall_seconds = transfer(words(8), 0.0_wp)
       kept%integration_seconds = transfer(words(9), 0.0_wp)
-      n_bytes = int(words(1 + message_at))
+      n_bytes = int(words(1 + at_message))
       at = fixed_words + 1
       kept%message = repeat(' ', n_bytes)
       do i = 1, n_bytes, 8
@@ -158,7 +158,7 @@ contains
 
       associate (case => words(1 + at_case), status => words(1 + at_status))
          fits_sweep = case >= 1 .and. case <= n_cases .and. (status == status_done .or. status == status_failed)
-         if (fits_sweep) fits_sweep = size(words) == record_words(shape, int(status), int(words(1 + message_at)))
+         if (fits_sweep) fits_sweep = size(words) == record_words(shape, int(status), int(words(1 + at_message)))
       end associate
    end function fits_sweep
 

@@ -218,7 +218,7 @@ contains
       end if
       call system_clock(clock_end)
       new%kept%wall_seconds = real(clock_end - clock_start, wp)/real(rate, wp)
-      call conclude_case(self%sweep, late, error, new%kept)
+      call conclude_case(self%sweep, new%keeper, late, error, new%kept)
       call self%feed%keep(ticket, new%kept, self%stopped)
       deallocate (new)
    end subroutine prepare_next
@@ -257,7 +257,7 @@ contains
             kept%integration_seconds = member%seconds
             kept%wall_seconds = member%preparation + member%seconds
             if (.not. allocated(member%error)) call keep_final(member%motion, member%t_end, member%y, member%keeper, member%error)
-            call conclude_case(self%sweep, member%late, member%error, kept)
+            call conclude_case(self%sweep, member%keeper, member%late, member%error, kept)
             call self%feed%keep(member%ticket, kept, stop_now)
             self%stopped = self%stopped .or. stop_now
          end associate
