@@ -44,6 +44,7 @@ contains
       logical, intent(in) :: ledger, expect_rows
       type(error_type), allocatable, intent(out) :: error
       logical, intent(in), optional :: force
+      type(error_type), allocatable :: failure
       type(run_file) :: run
       type(run_row) :: row
       integer :: r
@@ -56,10 +57,15 @@ contains
       row = new_run_row(n_rods)
       do r = 1, n_rows
          call fill(row, r)
-         call run%append(row, error)
-         if (allocated(error)) return
+         call run%append(row, failure)
+         if (allocated(failure)) exit
       end do
-      call run%finish('done', sample_report(), error)
+      if (allocated(failure)) then
+         call run%finish('failed', sample_report(), error, failure%message)
+         if (.not. allocated(error)) call move_alloc(failure, error)
+      else
+         call run%finish('done', sample_report(), error)
+      end if
    end subroutine write_sample_run
 
    function sample_header(n_rods, n_rows, ledger) result(header)

@@ -102,10 +102,12 @@ class Trials:
         wrong = ""
         if code not in allowed or program.CRASH.search(said):
             wrong = f"exit code {code}: {said}"
-        elif code != 0 and "out.h5" in left and differences(self.whole, self.directory / "out.h5") - OF_THE_HOUR:
+        elif code not in (0, 1) and "out.h5" in left and differences(self.whole, self.directory / "out.h5") - OF_THE_HOUR:
             wrong = f"a result that is not complete, exit code {code}"
         elif code == 0 and (left != {"out.h5"} or differences(self.whole, self.directory / "out.h5") - OF_THE_HOUR):
             wrong = f"not the result of an undisturbed run; files {left}"
+        elif code == 1 and left == {"out.h5"}:
+            wrong = self.part("out.h5", b"failed")
         elif code in (1, 2) and left:
             wrong = f"failed to write, and left {left}"
         elif code in (1, 2) and not said.strip():
@@ -119,14 +121,16 @@ class Trials:
         return wrong
 
     def stopped(self, left: set[str]) -> str:
-        if left != {"out.h5.stopped"}:
-            return f"stopped, and left {left}"
-        with h5py.File(self.directory / "out.h5.stopped") as part, h5py.File(self.whole) as whole:
+        return self.part("out.h5.stopped", b"stopped") if left == {"out.h5.stopped"} else f"stopped, and left {left}"
+
+    def part(self, name: str, status: bytes) -> str:
+        """What is wrong with a file that shall have the first rows of the undisturbed run."""
+        with h5py.File(self.directory / name) as part, h5py.File(self.whole) as whole:
             n = part["time"].size
-            if part.attrs["status"] != b"stopped" or n >= whole["time"].size:
-                return f"stopped with status {part.attrs['status']} and {n} rows"
+            if part.attrs["status"] != status or not 0 < n < whole["time"].size or part.attrs["t_reached"] != part["time"][-1]:
+                return f"{name} with status {part.attrs['status']} and {n} rows"
             if any(not np.array_equal(part[name][()], whole[name][:n]) for name in ("time", "phi", "alpha_rate", "energy_residual")):
-                return "stopped with other rows"
+                return f"{name} with other rows"
         return ""
 
 

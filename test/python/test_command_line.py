@@ -6,8 +6,10 @@ RODYN=path  the program under test; otherwise bin/rodyn.
 import os
 import pathlib
 import re
+import shutil
 import signal
 import subprocess
+import sys
 import threading
 import time
 
@@ -704,6 +706,73 @@ def test_a_signal_stops_a_run_that_can_be_made_again(tmp_path: pathlib.Path, nam
         assert rows["time"].size > 0
     case.write_text(text.replace("t_end = 30 ", "t_end = 0.1 "))
     assert subprocess.run(command, capture_output=True, check=False).returncode == 0
+
+
+def test_of_two_stops_the_more_rows_stay(tmp_path):
+    """A second, earlier stop costs nothing, a later one is kept; rows of another case are set aside."""
+    text = SCENES["flexible"].replace("t_end = 0.05, n_outputs = 5", "t_end = 1000, n_outputs = 10000000")
+
+    def stop(seconds: float) -> float:
+        with subprocess.Popen([RODYN, "run", "case.nml", "--quiet"], cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
+            wait_for_start(tmp_path)
+            time.sleep(seconds)
+            process.terminate()
+            errors = process.communicate(timeout=30)[1]
+        assert process.returncode == 75 and "case.h5.stopped" in errors, errors
+        with h5py.File(tmp_path / "case.h5.stopped") as rows:
+            assert rows.attrs["t_reached"] == rows["time"][-1]
+            return rows.attrs["t_reached"]
+
+    write_case(tmp_path, text)
+    first = stop(1.0)
+    before = (tmp_path / "case.h5.stopped").read_bytes()
+    assert stop(0.0) == first and (tmp_path / "case.h5.stopped").read_bytes() == before
+    assert stop(2.0) > first
+    assert files(tmp_path) == ["case.h5.stopped", "case.nml"]
+    longest = (tmp_path / "case.h5.stopped").read_bytes()
+    write_case(tmp_path, text.replace("1500", "1501"))
+    stop(0.0)
+    assert files(tmp_path) == ["case.h5.stopped", "case.h5.stopped-1", "case.nml"]
+    assert (tmp_path / "case.h5.stopped-1").read_bytes() == longest
+
+
+def test_a_run_can_be_looked_at_while_it_grows(tmp_path):
+    """By xarray and by the scripts, under its temporary name; and kill -9 leaves the rows."""
+    write_case(tmp_path, SCENES["flexible"].replace("t_end = 0.05, n_outputs = 5", "t_end = 10000, n_outputs = 100000"))
+    with subprocess.Popen([RODYN, "run", "case.nml", "--quiet"], cwd=tmp_path) as process:
+        path = tmp_path / f"case.h5.partial-{process.pid}"
+        sizes = [1]
+        end = time.monotonic() + 60
+        while len(sizes) < 3 and time.monotonic() < end:
+            time.sleep(0.05)
+            try:
+                with xarray.open_dataset(path) as run:
+                    run.load()
+            except (OSError, KeyError):  # not there yet, or being written just now
+                continue
+            assert run.attrs["status"] == "running"
+            assert np.all(np.isfinite(run.phi)) and np.all(np.diff(run.time) > 0)
+            if run.sizes["time"] > sizes[-1]:
+                sizes.append(run.sizes["time"])
+        process.kill()  # long before it writes again
+    assert len(sizes) == 3, sizes
+    with xarray.open_dataset(path) as run:
+        assert run.sizes["time"] == sizes[-1] and np.all(np.isfinite(run.load().energy_residual))
+    drawn = subprocess.run([sys.executable, ROOT / "postproc" / "histories.py", path, "-q", "omega", "-o", tmp_path / "omega.png"],
+                           capture_output=True, text=True)
+    assert drawn.returncode == 0, drawn.stderr
+
+
+def test_a_directory_that_is_removed_under_way_is_made_again(tmp_path):
+    write_case(tmp_path, (ROOT / "cases" / "table1.nml").read_text().replace("t_end = 30 ", "t_end = 60 "))
+    (tmp_path / "out").mkdir()
+    with subprocess.Popen([RODYN, "run", "case.nml", "--output", "out/x.h5", "--quiet"], cwd=tmp_path) as process:
+        wait_for_start(tmp_path / "out")
+        shutil.rmtree(tmp_path / "out")
+        assert process.wait(60) == 0
+    assert files(tmp_path / "out") == ["x.h5"]
+    with h5py.File(tmp_path / "out" / "x.h5") as run:
+        assert run.attrs["status"] == b"done" and run["time"][-1] == 60
 
 
 def wait_for_start(directory: pathlib.Path) -> None:

@@ -136,8 +136,8 @@ def limited(blocks):
     return apply
 
 
-@pytest.mark.parametrize("limit", [3_000, 150_000, 200_000, 400_000, 2_000_000, 20_000_000])
-def test_a_full_disk_ends_with_a_message(tmp_path, limit):
+@pytest.mark.parametrize("limit", [3_000, 150_000, 280_000, 330_000, 400_000, 2_500_000, 20_000_000])
+def test_a_full_disk_ends_with_a_message_and_the_rows_until_then(tmp_path, limit):
     path = tmp_path / "full.h5"
     n_rods = 4 if limit < 500_000 else 1000
     run = subprocess.run([sample_run_program(), str(path), str(n_rods), "1001"], preexec_fn=limited(limit),
@@ -145,7 +145,18 @@ def test_a_full_disk_ends_with_a_message(tmp_path, limit):
     assert run.returncode == 1, run.stderr
     assert "File too large" in run.stderr
     assert len(run.stderr.splitlines()) == 1  # no backtrace, nothing from HDF5
-    assert list(tmp_path.iterdir()) == []
+    if limit < 200_000:  # the input alone takes 150 kB
+        assert list(tmp_path.iterdir()) == []
+        return
+    assert [p.name for p in tmp_path.iterdir()] == ["full.h5"]
+    whole = tmp_path / "whole.h5"
+    subprocess.run([sample_run_program(), str(whole), str(n_rods), "1001"], check=True)
+    with xarray.open_dataset(path) as rows, xarray.open_dataset(whole) as all_rows:
+        n = rows.sizes["time"]
+        assert 0 < n < 1001
+        assert (rows.attrs["status"], rows.attrs["t_reached"]) == ("failed", rows.time[-1])
+        assert "File too large" in rows.attrs["message"]
+        assert rows.equals(all_rows.isel(time=slice(n)))
 
 
 def test_a_killed_run_leaves_only_its_temporary_name(tmp_path):

@@ -12,7 +12,7 @@ module rodyn_posix
    public :: path_exists, same_path, is_directory, is_special, is_writable, parent_directory
    public :: sync_path, rename_over, rename_new, remove_file
    public :: ignore_signal, sigpipe, sigxfsz, write_output, write_text, standard_output, standard_error
-   public :: last_failure, last_failure_is
+   public :: error_text, last_failure, last_failure_is
 
    integer(c_int), parameter :: f_ok = 0, w_ok = 2, x_ok = 1               ! <unistd.h>
    integer(c_int), parameter :: o_rdonly = 0                               ! <fcntl.h>
@@ -502,6 +502,7 @@ contains
       number = location
    end function errno
 
+   !> What an errno means.
    function error_text(number) result(text)
       integer(c_int), intent(in) :: number
       character(len=:), allocatable :: text

@@ -7,9 +7,9 @@ module rodyn_resources
    use rodyn_text, only: formatted
    implicit none (type, external)
    private
-   public :: ensure_stack, free_memory, free_disk, byte_text
+   public :: ensure_stack, free_memory, free_disk, file_size_limit, byte_text
 
-   integer(c_int), parameter :: rlimit_stack = 3, rlimit_as = 9 ! <sys/resource.h>, Linux
+   integer(c_int), parameter :: rlimit_fsize = 1, rlimit_stack = 3, rlimit_as = 9 ! <sys/resource.h>, Linux
    integer(c_int64_t), parameter :: least_stack = 1024*1024     !! of the program, several times what it uses [bytes]
    real(wp), parameter :: unknown = 1.0e300_wp
 
@@ -87,6 +87,14 @@ contains
       if (posix_statvfs(directory//c_null_char, words) /= 0) return
       free_disk = real(words(fragment_size), wp)*real(words(fragments_left), wp)
    end function free_disk
+
+   !> How large a file may become (ulimit -f); huge if there is no limit [bytes].
+   real(wp) function file_size_limit()
+      integer(c_int64_t) :: limits(2)
+      file_size_limit = unknown
+      if (posix_getrlimit(rlimit_fsize, limits) /= 0) return
+      if (limits(1) >= 0) file_size_limit = real(limits(1), wp)
+   end function file_size_limit
 
    !> The number behind a word at the beginning of a line; huge if there is none.
    real(wp) function number_in(path, word)

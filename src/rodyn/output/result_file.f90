@@ -1,13 +1,17 @@
 !> A result on its way to the disk, and what every result says of its origin.
 !>
 !> Until `complete` has put everything onto the disk, the file has a temporary name, `PATH.partial-PID`: whatever has the
-!> final name is complete.
+!> final name is complete. What is about to be written is reserved before: a file that has been flushed stays sound.
 module rodyn_result_file
+   use, intrinsic :: iso_c_binding, only: c_int
    use rodyn_build_info, only: compiler, compiler_options, git_commit, program_version
    use rodyn_errors, only: error_type, exit_bad_input, raise
+   use rodyn_file_room, only: file_room
    use rodyn_hdf5_files, only: hdf5_file, hdf5_version
-   use rodyn_posix, only: host_name, ignore_signal, is_directory, is_special, is_writable, parent_directory, &
-      path_exists, process_id, remove_file, rename_new, rename_over, sigxfsz, sync_path, utc_now
+   use rodyn_kinds, only: i8
+   use rodyn_posix, only: host_name, ignore_signal, is_directory, is_special, is_writable, last_failure, parent_directory, &
+      path_exists, posix_close, process_id, remove_file, rename_new, rename_over, sigxfsz, sync_path, utc_now
+   use rodyn_posix_files, only: create_file, make_directory
    implicit none (type, external)
    private
    public :: provenance, result_file, check_output_path, text_or_empty
@@ -29,13 +33,18 @@ module rodyn_result_file
       character(len=:), allocatable :: path !! final name
       character(len=:), allocatable :: temporary_path
       logical :: force = .false.            !! `complete` may replace an existing file
+      logical :: worth_keeping = .false.    !! what has been flushed is of use, even if the rest cannot be written
+      type(file_room), private :: room
    contains
       procedure :: begin
+      procedure :: reserve
       procedure :: write_provenance
       procedure :: describe
       procedure :: complete
       procedure :: discard
+      procedure :: leave
       procedure, private :: put_on_disk
+      procedure, private :: bring_back
    end type result_file
 
 contains
@@ -73,16 +82,30 @@ contains
       character(len=*), intent(in) :: path                !! final name
       logical, intent(in) :: force                        !! `complete` may replace an existing file
       type(error_type), allocatable, intent(out) :: error
+      character(len=:), allocatable :: failure
 
       call check_output_path(path, force, error)
       if (allocated(error)) return
       call ignore_signal(sigxfsz)
       self%path = path
+      self%worth_keeping = .false.
       self%temporary_path = free_temporary_name(path)
       self%force = force
       call self%file%create(self%temporary_path, error)
+      if (.not. allocated(error)) then
+         failure = self%room%open(self%temporary_path)
+         if (len(failure) > 0) call raise(error, self%temporary_path//': cannot be opened: '//failure)
+      end if
       if (allocated(error)) call self%discard() ! on a full disk it is there, empty
    end subroutine begin
+
+   !> Make sure that the file may grow by so many bytes; empty: it may.
+   function reserve(self, bytes) result(failure)
+      class(result_file), intent(in) :: self
+      integer(i8), intent(in) :: bytes
+      character(len=:), allocatable :: failure
+      failure = self%room%reserve(bytes)
+   end function reserve
 
    !> Root attributes: what ran, with what, on what.
    subroutine write_provenance(self, origin, error)
@@ -133,10 +156,11 @@ contains
       if (.not. allocated(error)) call self%file%flush(error)
       if (.not. allocated(error)) call self%file%close(error)
       if (allocated(error)) then
-         call self%discard()
+         call self%leave(error)
       else
          call self%put_on_disk(error)
       end if
+      call self%room%close()
    end subroutine complete
 
    !> Give up: close and remove the temporary file.
@@ -146,8 +170,24 @@ contains
       character(len=:), allocatable :: failure
 
       call self%file%close(ignored)
+      call self%room%close()
       if (allocated(self%temporary_path)) failure = remove_file(self%temporary_path)
    end subroutine discard
+
+   !> Close what could not be completed. If it is of use, it stays, and the message says where.
+   subroutine leave(self, error)
+      class(result_file), intent(inout) :: self
+      type(error_type), intent(inout) :: error
+      type(error_type), allocatable :: ignored
+
+      if (.not. self%worth_keeping) then
+         call self%discard()
+         return
+      end if
+      call self%file%close(ignored)
+      call self%room%close()
+      error%message = error%message//"; what was written is left as '"//self%temporary_path//"'"
+   end subroutine leave
 
    !> Sync the closed file, rename it, sync the directory's names. If the final name was taken meanwhile, the
    !> result stays under its temporary name and the message says so.
@@ -157,7 +197,9 @@ contains
       character(len=:), allocatable :: failure
       logical :: taken
 
-      failure = sync_path(self%temporary_path)
+      failure = ''
+      if (.not. path_exists(self%temporary_path)) failure = self%bring_back()
+      if (len(failure) == 0) failure = sync_path(self%temporary_path)
       if (len(failure) > 0) then
          call raise(error, self%temporary_path//': the result could not be put onto the disk: '//failure)
          return
@@ -179,6 +221,23 @@ contains
          if (len(failure) > 0) call raise(error, self%path//': its name could not be put onto the disk: '//failure)
       end if
    end subroutine put_on_disk
+
+   !> Somebody has removed the file, perhaps with its directory: as long as it is open its content is there.
+   function bring_back(self) result(failure)
+      class(result_file), intent(in) :: self
+      character(len=:), allocatable :: failure
+      integer(c_int) :: descriptor, status
+
+      failure = make_directory(parent_directory(self%temporary_path))
+      if (len(failure) > 0) return
+      descriptor = create_file(self%temporary_path)
+      if (descriptor < 0) then
+         failure = last_failure()
+         return
+      end if
+      failure = self%room%copy(descriptor)
+      status = posix_close(descriptor)
+   end function bring_back
 
    !> A name beside the final one that no file has. Process numbers repeat in containers, so they alone will not do.
    function free_temporary_name(path) result(name)

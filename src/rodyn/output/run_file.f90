@@ -5,17 +5,24 @@
 !>     call run%append(row, error)                     ! once per output time
 !>     call run%finish('done', report, error)
 !>
-!> Until `finish`, the file has a temporary name (`rodyn_result_file`). After a failure to write, it is removed, and every
-!> later call tells of that failure again, so that the caller may end its work in the usual way.
+!> Until `finish`, the file has a temporary name (`rodyn_result_file`) under which it may be read: rows are in it a block at
+!> a time, and after `flush_seconds` at the latest, in long runs a tenth of their time so far. Where they find no room, `append`
+!> fails, and `finish` ends the file as a failed one with the rows that did. After a failure within HDF5 the file is left as
+!> it is, and every later call tells of that failure again, so that the caller may end its work in the usual way.
 module rodyn_run_file
+   use rodyn_build_info, only: git_commit
    use rodyn_errors, only: error_type, raise
+   use rodyn_hdf5_files, only: hdf5_file
    use rodyn_kinds, only: i8, wp
+   use rodyn_posix, only: path_exists
+   use rodyn_posix_files, only: rename_aside
    use rodyn_result_file, only: check_output_path, provenance, result_file, text_or_empty
    use rodyn_run_layout, only: i_alpha, i_alpha_rate, i_angular_momentum, i_beta, i_beta_rate, i_bubble, i_bubble_rate, &
       i_displacement_x, i_displacement_y, i_energy_dissipated, i_energy_elastic, i_energy_kinetic, i_energy_residual, &
       i_momentum_x, &
       i_momentum_y, i_omega, i_phi, i_phi_rate, i_rotation, i_time, i_velocity_x, i_velocity_y, i_work_external, &
       n_run_variables, run_coordinates, run_variables, solver_group, events_group
+   use rodyn_text, only: short_text
    implicit none (type, external)
    private
    public :: run_file, run_header, run_row, solver_report, new_run_row, is_finite, check_output_path
@@ -23,6 +30,14 @@ module rodyn_run_file
    integer, parameter :: block_bytes = 2*1024*1024 !! memory for rows that wait to be written
    integer, parameter :: most_block_rows = 4096
    integer, parameter :: bytes_per_real = 8
+   real(wp), parameter :: flush_seconds = 2.0_wp, flush_share = 0.1_wp !! of wall time [s], of that since the start
+
+   ! Room that HDF5 takes beside the numbers [bytes]
+   integer(i8), parameter :: bytes_of_layout = 3000_i8 !! of one data set, empty
+   integer(i8), parameter :: bytes_of_node = 2700_i8   !! of the index of a data set: a tree with 32 to 64 chunks to a node
+   integer, parameter :: chunks_per_node = 32
+   integer(i8), parameter :: bytes_at_end = 32768_i8   !! of the group `solver`, a message and the last attributes
+   integer(i8), parameter :: bytes_per_event = 64_i8
 
    !> What is known before the first row.
    type, extends(provenance) :: run_header
@@ -93,9 +108,14 @@ module rodyn_run_file
       logical, private :: bubbles = .false.
       integer, private :: n_rods = 0
       integer, private :: block_rows = 0
+      integer, private :: compression = 0
       integer, private :: waiting = 0                  !! rows in the columns
-      integer(i8), private :: n_rows = 0_i8            !! rows appended so far
-      real(wp), private :: last_time = 0.0_wp          !! of the last row [s]
+      integer, private :: written = 0                  !! of them, in the file already
+      integer, private :: n_blocks = 0                 !! that are full and in the file
+      real(wp), private :: last_time = 0.0_wp          !! of the last row in the file [s]
+      integer(i8), private :: clock_start = 0, clock_written = 0
+      character(len=:), allocatable, private :: resolved_input
+      character(len=:), allocatable, private :: no_room !! why a row or the events are not in the file
       character(len=:), allocatable, private :: lost   !! why the file was given up
       type(column), private :: columns(n_run_variables)
    contains
@@ -103,12 +123,15 @@ module rodyn_run_file
       procedure :: append
       procedure :: write_events
       procedure :: finish
-      procedure :: redirect
+      procedure :: stop_at
       procedure, private :: check_open
       procedure, private :: give_up
       procedure, private :: write_layout
       procedure, private :: write_solver_report
+      procedure, private :: flush_is_due
       procedure, private :: write_waiting_rows
+      procedure, private :: write_rows
+      procedure, private :: room_for
    end type run_file
 
 contains
@@ -137,14 +160,55 @@ contains
       is_finite = is_finite .and. all(abs(row%bubble) <= most) .and. all(abs(row%bubble_rate) <= most)
    end function is_finite
 
-   !> Let the finished file have another name, replacing what has it: the rows of a stopped run do not take the
-   !> place of its result.
-   subroutine redirect(self, path)
+   !> The rows of a stopped run get a name of their own, so that the same call can be made again. If there are some of that
+   !> name already, of the same case, the more stay: `earlier` is true, the longer file is left alone and this one removed.
+   !> Rows of another case are set aside as PATH-1, PATH-2, ...
+   subroutine stop_at(self, path, alike, earlier, error)
       class(run_file), intent(inout) :: self
       character(len=*), intent(in) :: path
+      logical, intent(in) :: alike                          !! runs of equal input are equal
+      logical, intent(out) :: earlier
+      type(error_type), allocatable, intent(out) :: error
+      character(len=:), allocatable :: name, failure
+      logical :: same
+      real(wp) :: t_earlier, t_reached
+
       self%path = path
       self%force = .true.
-   end subroutine redirect
+      earlier = .false.
+      if (.not. path_exists(path)) return
+      call compare(path, self%resolved_input, same, t_earlier)
+      if (same .and. alike) then
+         t_reached = self%last_time
+         if (self%waiting > 0) t_reached = self%columns(i_time)%scalars(self%waiting)
+         earlier = t_earlier >= t_reached
+      else
+         call rename_aside(path, path, '', name, failure)
+         if (len(failure) > 0) call raise(error, path//': cannot be set aside: '//failure)
+      end if
+   end subroutine stop_at
+
+   !> Is a file one of rows of this program and this input, and how far do they go?
+   subroutine compare(path, resolved_input, same, t_reached)
+      character(len=*), intent(in) :: path, resolved_input
+      logical, intent(out) :: same
+      real(wp), intent(out) :: t_reached !! [s]
+      type(hdf5_file) :: file
+      type(error_type), allocatable :: error
+      character(len=:), allocatable :: text
+
+      t_reached = 0.0_wp
+      same = .false.
+      call file%open(path, error)
+      if (.not. allocated(error)) call file%get_attribute('/', 'resolved_input', text, error)
+      if (allocated(error)) return
+      same = text == resolved_input
+      call file%get_attribute('/', 'git_commit', text, error)
+      if (.not. allocated(error)) same = same .and. text == git_commit()
+      if (.not. allocated(error)) call file%get_attribute('/', 't_reached', t_reached, error)
+      same = same .and. .not. allocated(error)
+      call file%close(error)
+   end subroutine compare
 
    !> Make the file under its temporary name, with all data sets, empty, and the root attributes.
    subroutine create(self, path, header, force, error)
@@ -153,6 +217,7 @@ contains
       type(run_header), intent(in) :: header
       logical, intent(in) :: force                        !! `finish` may replace an existing file
       type(error_type), allocatable, intent(out) :: error
+      character(len=:), allocatable :: failure
       integer :: i
       logical :: used
 
@@ -160,10 +225,16 @@ contains
       self%bubbles = header%bubbles
       self%n_rods = header%n_rods
       self%block_rows = rows_per_block(header)
+      self%compression = header%compression
       self%waiting = 0
-      self%n_rows = 0_i8
+      self%written = 0
+      self%n_blocks = 0
       self%last_time = 0.0_wp
+      self%resolved_input = text_or_empty(header%resolved_input)
+      call system_clock(self%clock_start)
+      self%clock_written = self%clock_start
       if (allocated(self%lost)) deallocate (self%lost)
+      if (allocated(self%no_room)) deallocate (self%no_room)
       do i = 1, n_run_variables
          used = self%ledger .or. .not. run_variables(i)%ledger
          if (i == i_bubble .or. i == i_bubble_rate) used = self%bubbles
@@ -172,10 +243,15 @@ contains
 
       call self%begin(path, force, error)
       if (allocated(error)) return
-      call self%write_layout(header%compression, error)
+      failure = self%reserve(bytes_at_end + n_run_variables*bytes_of_layout + len(text_or_empty(header%input)) &
+                             + len(self%resolved_input) + len(text_or_empty(header%notes)))
+      if (len(failure) > 0) call raise(error, path//': cannot be written: '//failure)
+      if (.not. allocated(error)) call self%write_layout(header%compression, error)
       if (.not. allocated(error)) call self%write_provenance(header%provenance, error)
       if (.not. allocated(error)) call self%file%flush(error)
-      if (allocated(error)) call self%give_up(error)
+      if (.not. allocated(error)) return
+      call self%discard()
+      self%lost = error%message
    end subroutine create
 
    !> An error where there is no file to write to.
@@ -191,11 +267,11 @@ contains
       end if
    end subroutine check_open
 
-   !> Remove what cannot be written, and keep in mind why.
+   !> Leave what cannot be written on, and keep in mind why.
    subroutine give_up(self, error)
       class(run_file), intent(inout) :: self
-      type(error_type), intent(in) :: error
-      call self%discard()
+      type(error_type), intent(inout) :: error
+      call self%leave(error)
       self%lost = error%message
    end subroutine give_up
 
@@ -208,8 +284,6 @@ contains
       call self%check_open(error)
       if (allocated(error)) return
       self%waiting = self%waiting + 1
-      self%n_rows = self%n_rows + 1_i8
-      self%last_time = row%time
       associate (at => self%waiting, columns => self%columns)
          columns(i_time)%scalars(at) = row%time
          columns(i_phi)%rods(:, at) = row%phi
@@ -239,11 +313,16 @@ contains
             columns(i_angular_momentum)%scalars(at) = row%angular_momentum
          end if
       end associate
-      if (self%waiting < self%block_rows) return
-      call self%write_waiting_rows(error)
-      if (.not. allocated(error)) call self%file%flush(error)
-      if (allocated(error)) call self%give_up(error)
+      if (self%waiting == self%block_rows .or. self%flush_is_due()) call self%write_waiting_rows(error)
    end subroutine append
+
+   !> Has it been long since rows were written?
+   logical function flush_is_due(self)
+      class(run_file), intent(in) :: self
+      integer(i8) :: now, rate
+      call system_clock(now, rate)
+      flush_is_due = now - self%clock_written > max(flush_seconds*rate, flush_share*real(now - self%clock_start, wp))
+   end function flush_is_due
 
    !> The group `events` of a run that may have some, before `finish`. Without events its data sets are empty.
    subroutine write_events(self, time, hinge, kind, energy_lost, error)
@@ -258,10 +337,16 @@ contains
       character(len=*), parameter :: units(4) = [character(len=2) :: 's', '1', '1', 'J']
       character(len=*), parameter :: meanings(4) = [character(len=48) :: 'time of the event', &
          'hinge, counted from the spacecraft', 'what happened', 'mechanical energy lost in it']
+      character(len=:), allocatable :: failure
       integer :: i
 
       call self%check_open(error)
       if (allocated(error)) return
+      failure = self%reserve(bytes_at_end + size(names)*(bytes_of_layout + bytes_of_node) + size(time)*bytes_per_event)
+      if (len(failure) > 0) then
+         if (.not. allocated(self%no_room)) self%no_room = 'events find no room: '//failure
+         return
+      end if
       call self%file%create_group(events_group, error)
       if (.not. allocated(error)) call self%file%write('events/time', time, 0, error)
       if (.not. allocated(error)) call self%file%make_scale('events/time', error)
@@ -276,26 +361,43 @@ contains
       if (allocated(error)) call self%give_up(error)
    end subroutine write_events
 
-   !> Write what waits, the final attributes, and give the file its final name.
+   !> Write what waits, the final attributes, and give the file its final name. A file in which something found no room is
+   !> one of a failed run, and that is an error.
    subroutine finish(self, status, report, error, message)
       class(run_file), intent(inout) :: self
       character(len=*), intent(in) :: status             !! 'done', 'failed', 'stopped'
       type(solver_report), intent(in) :: report
       type(error_type), allocatable, intent(out) :: error
       character(len=*), intent(in), optional :: message  !! why it is not done
+      character(len=:), allocatable :: outcome, reason, warnings
 
       call self%check_open(error)
       if (allocated(error)) return
       call self%write_waiting_rows(error)
-      if (.not. allocated(error)) call self%write_solver_report(report, error)
+      if (allocated(error) .and. .not. self%file%is_open()) return
+      if (allocated(self%no_room) .and. .not. self%worth_keeping) then
+         call self%discard()
+         call raise(error, self%no_room)
+         return
+      end if
+      outcome = status
+      reason = ''
+      if (allocated(self%no_room) .and. status == 'done') outcome = 'failed'
+      if (allocated(self%no_room)) reason = self%no_room
+      if (present(message)) reason = message
+      warnings = text_or_empty(report%warnings)
+      if (len(self%reserve(bytes_at_end + len(warnings))) > 0) warnings = 'left out for want of room'
+      call self%write_solver_report(report, error)
       if (.not. allocated(error)) call self%file%put_attribute('/', 't_reached', self%last_time, error)
-      if (.not. allocated(error)) call self%file%put_attribute('/', 'warnings', text_or_empty(report%warnings), error)
-      if (.not. allocated(error) .and. present(message)) call self%file%put_attribute('/', 'message', message, error)
+      if (.not. allocated(error)) call self%file%put_attribute('/', 'warnings', warnings, error)
+      if (.not. allocated(error) .and. outcome /= 'done') call self%file%put_attribute('/', 'message', reason, error)
       if (allocated(error)) then
          call self%give_up(error)
       else
-         call self%complete(status, error)
+         call self%complete(outcome, error)
       end if
+      if (.not. allocated(error) .and. outcome /= status) &
+         call raise(error, reason//' (rows until then are in '//self%path//')')
    end subroutine finish
 
    !> All data sets, coordinates attached, and the group `solver`.
@@ -386,23 +488,84 @@ contains
 
    end subroutine write_solver_report
 
-   !> Write the rows that wait; data sets grow by exactly these.
+   !> Write the rows that wait, as far as there is room for them. Those that find none are dropped.
    subroutine write_waiting_rows(self, error)
       class(run_file), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
-      integer :: i
+      character(len=:), allocatable :: failure
+      integer :: rows
 
-      do i = 1, n_run_variables
-         if (.not. self%columns(i)%used) cycle
-         if (run_variables(i)%per_rod) then
-            call self%file%append(trim(run_variables(i)%name), self%columns(i)%rods(:, :self%waiting), error)
-         else
-            call self%file%append(trim(run_variables(i)%name), self%columns(i)%scalars(:self%waiting), error)
-         end if
+      failure = ''
+      do while (self%written < self%waiting)
+         rows = self%room_for(self%waiting, failure)
+         if (rows == self%written) exit
+         call self%write_rows(rows, error)
          if (allocated(error)) return
       end do
+      if (self%written < self%waiting) then
+         self%waiting = self%written
+         self%no_room = self%path//': rows after t = '//short_text(self%last_time)//' s find no room: '//failure
+         call raise(error, self%no_room)
+      end if
+      if (self%waiting < self%block_rows) return
+      self%n_blocks = self%n_blocks + 1
       self%waiting = 0
+      self%written = 0
    end subroutine write_waiting_rows
+
+   !> How many of the first rows of the block there is room for: all, or those written before and a half, a quarter, ... of the
+   !> rest, or only those.
+   integer function room_for(self, most, failure) result(rows)
+      class(run_file), intent(in) :: self
+      integer, intent(in) :: most                           !! rows
+      character(len=:), allocatable, intent(out) :: failure !! why not all; empty: all
+      character(len=:), allocatable :: reason
+      integer(i8) :: row_bytes, rest
+      integer :: nodes !! that the index of each data set may need now
+
+      row_bytes = bytes_per_real*(count(run_variables%per_rod .and. self%columns%used)*int(self%n_rods, i8) &
+                                  + count(.not. run_variables%per_rod .and. self%columns%used))
+      nodes = merge(3, merge(1, 0, self%written == 0 .and. self%n_blocks == 0), &
+                    self%n_blocks > 0 .and. modulo(self%n_blocks, chunks_per_node) == 0)
+      rest = bytes_at_end + count(self%columns%used)*nodes*bytes_of_node
+      rows = most
+      failure = ''
+      do
+         reason = self%reserve(rest + row_bytes*merge(rows, self%block_rows, self%compression > 0))
+         if (rows == most) failure = reason
+         if (len(reason) == 0) return
+         rows = self%written + (rows - self%written)/2
+         if (rows == self%written) return
+      end do
+   end function room_for
+
+   !> Write rows of the block up to one of them; data sets grow by exactly those that are not in the file.
+   subroutine write_rows(self, last, error)
+      class(run_file), intent(inout) :: self
+      integer, intent(in) :: last
+      type(error_type), allocatable, intent(out) :: error
+      integer :: i
+
+      associate (first => self%written + 1)
+         do i = 1, n_run_variables
+            if (.not. self%columns(i)%used .or. allocated(error)) cycle
+            if (run_variables(i)%per_rod) then
+               call self%file%append(trim(run_variables(i)%name), self%columns(i)%rods(:, first:last), error)
+            else
+               call self%file%append(trim(run_variables(i)%name), self%columns(i)%scalars(first:last), error)
+            end if
+         end do
+      end associate
+      if (.not. allocated(error)) call self%file%flush(error)
+      if (allocated(error)) then
+         call self%give_up(error)
+         return
+      end if
+      self%worth_keeping = .true.
+      self%written = last
+      self%last_time = self%columns(i_time)%scalars(last)
+      call system_clock(self%clock_written)
+   end subroutine write_rows
 
    !> Memory for one block of one data set.
    pure function new_column(header, per_rod, used) result(entry)

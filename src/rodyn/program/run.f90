@@ -45,7 +45,7 @@ contains
 
    !> Run a case and write its file. On failure of the integration the file holds all rows until then, with
    !> status 'failed'; on refused input nothing is written. A run that is asked to stop (see `watch_signals`) leaves
-   !> its rows in `path`.stopped, so that the same call can be made again.
+   !> its rows in `path`.stopped, so that the same call can be made again; of two stopped runs the more rows stay.
    subroutine run_case(config, path, error, input_text, force, quiet, load, name)
       type(case_config), intent(in) :: config
       character(len=*), intent(in) :: path                 !! of the HDF5 file
@@ -64,7 +64,7 @@ contains
       real(wp), allocatable :: y(:)
       type(error_type), allocatable :: failure
       character(len=:), allocatable :: written
-      logical :: silent, replace
+      logical :: silent, replace, earlier
       integer(i8) :: clock_start, clock_end, clock_rate
       real(wp) :: t
 
@@ -115,12 +115,14 @@ contains
       call progress%finish()
       call system_clock(clock_end)
       written = path
+      earlier = .false.
       if (allocated(failure)) then
          if (failure%exit_code == exit_stopped) written = path//'.stopped'
       end if
-      if (written /= path) call recorder%file%redirect(written)
-      if (motion%events%watches) call write_events(recorder%file, motion, error)
-      if (.not. allocated(error)) &
+      if (written /= path) call recorder%file%stop_at(written, .not. present(load), earlier, error)
+      if (earlier) call recorder%file%discard()
+      if (motion%events%watches .and. .not. (earlier .or. allocated(error))) call write_events(recorder%file, motion, error)
+      if (.not. (earlier .or. allocated(error))) &
          call close_file(recorder, driver, config, scene, failure, &
                       real(clock_end - clock_start, wp)/real(clock_rate, wp), error)
       if (.not. silent .and. .not. allocated(error)) call print_events(motion)
@@ -130,7 +132,8 @@ contains
       call driver%finalize()
       if (allocated(error)) return
       if (allocated(failure)) then
-         failure%message = failure%message//' (rows until then are in '//written//')'
+         failure%message = failure%message//' (rows until then are in '//written// &
+                           trim(merge(', of an earlier run)', ')                   ', earlier))
          call move_alloc(failure, error)
       end if
    end subroutine run_case
