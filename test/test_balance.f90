@@ -531,6 +531,8 @@ contains
          case (4) ! 0.3 rad at t = 0, and hardly more at 0.02 s
             program%t_start = -1.0e6_wp
             program%t_end = 1.0_wp
+         case default
+            continue
          end select
          if (i == 1) config%chain%kink = 0.3_wp
          if (i > 1) config%kink_programs = [program]
@@ -690,6 +692,8 @@ contains
          case (4)
             config%hinges(2)%release_time = none_given
             config%hinges(2)%release_after = 0
+         case default
+            continue
          end select
          call integrate(config, [0.0_wp, 12.0_wp], run, error)
          if (allocated(error)) return
