@@ -10,6 +10,7 @@ module rodyn_sweep_worker
    use rodyn_lane_scene, only: are_alike, suits_lanes
    use rodyn_lanes, only: lanes
    use rodyn_driver, only: driver_type
+   use rodyn_method_choice, only: method_choice
    use rodyn_scene, only: scene_type
    use rodyn_sweep_case, only: case_result, case_shape, clear_result, conclude_case, integrate_case, keep_final, keeper_type, &
       prepare_case, pulse_type
@@ -56,7 +57,7 @@ module rodyn_sweep_worker
       integer :: ticket = 0
       type(case_result) :: kept
       type(keeper_type) :: keeper
-      type(driver_type) :: driver
+      type(method_choice) :: choice
       real(wp) :: preparation = 0.0_wp !! wall time before the integration [s]
    end type lane_case
 
@@ -183,37 +184,48 @@ contains
       end do
    end subroutine take_waiting
 
-   !> Take a case from the feed and prepare it. If it cannot go in a lane, compute it at once.
+   !> Take a case from the feed and prepare it.
    subroutine prepare_next(self, new)
       class(worker_type), intent(inout) :: self
       type(lane_case), pointer, intent(out) :: new !! not associated: none for a lane
-      type(error_type), allocatable :: error
-      integer(i8) :: clock_start, clock_end, rate
       integer :: ticket, case
-      logical :: late
 
       nullify (new)
       call self%feed%beat(self%stopped)
       if (self%stopped) return
       call self%feed%next(ticket, case)
       self%ended = case == 0
-      if (self%ended) return
+      if (.not. self%ended) call begin_case(self, ticket, case, self%in_lanes, new)
+   end subroutine prepare_next
+
+   !> Prepare a case. If it cannot go in a lane, compute it at once.
+   subroutine begin_case(self, ticket, case, in_lanes, new)
+      class(worker_type), intent(inout) :: self
+      integer, intent(in) :: ticket, case
+      logical, intent(in) :: in_lanes !! it may
+      type(lane_case), pointer, intent(out) :: new !! not associated: none for a lane
+      type(driver_type) :: driver
+      type(error_type), allocatable :: error
+      integer(i8) :: clock_start, clock_end, rate
+      logical :: late
+
       call system_clock(clock_start, rate)
       allocate (new)
       new%ticket = ticket
       call clear_result(new%kept, self%shape, case)
       new%keeper%kept => new%kept
       call prepare_case(self%sweep, self%plan, self%shape, case, self%feed, clock_start, new%motion, new%y, new%times, &
-                        new%t_end, new%keeper, new%driver, late, error)
+                        new%t_end, new%keeper, driver, late, error)
       if (.not. allocated(error) .and. self%sweep%integrate) then
-         new%options = new%driver%choice%options
+         new%choice = driver%choice
+         new%options = driver%choice%options
          new%limit = self%sweep%case_seconds
-         if (self%in_lanes .and. goes_in_lane(new)) then
+         if (in_lanes .and. goes_in_lane(new)) then
             call system_clock(clock_end)
             new%preparation = real(clock_end - clock_start, wp)/real(rate, wp)
             return
          end if
-         call integrate_case(self%sweep, new%driver, new%times, new%t_end, self%feed, clock_start, new%motion, new%y, &
+         call integrate_case(self%sweep, driver, new%times, new%t_end, self%feed, clock_start, new%motion, new%y, &
                              new%keeper, late, error)
       end if
       call system_clock(clock_end)
@@ -221,12 +233,12 @@ contains
       call conclude_case(self%sweep, new%keeper, late, error, new%kept)
       call self%feed%keep(ticket, new%kept, self%stopped)
       deallocate (new)
-   end subroutine prepare_next
+   end subroutine begin_case
 
    pure logical function goes_in_lane(case)
       type(lane_case), intent(in) :: case
       goes_in_lane = .false.
-      if (case%driver%choice%method == 'dop853' .and. suits_lane_dop853(case%driver%choice%options)) &
+      if (case%choice%method == 'dop853' .and. suits_lane_dop853(case%choice%options)) &
          goes_in_lane = suits_lanes(case%motion%dynamics%scene)
    end function goes_in_lane
 
@@ -242,10 +254,11 @@ contains
       end select
    end subroutine observe
 
-   !> Keep what came of a case.
+   !> Keep what came of a case. Where `dop853` gave up and was chosen by `auto`, the case is computed again by itself.
    subroutine finish(self, member)
       class(worker_type), intent(inout) :: self
       class(ensemble_member), pointer, intent(inout) :: member
+      type(lane_case), pointer :: none
       logical :: stop_now
 
       select type (member)
@@ -256,10 +269,15 @@ contains
             kept%n_rhs = member%counts%n_rhs
             kept%integration_seconds = member%seconds
             kept%wall_seconds = member%preparation + member%seconds
-            if (.not. allocated(member%error)) call keep_final(member%motion, member%t_end, member%y, member%keeper, member%error)
-            call conclude_case(self%sweep, member%keeper, member%late, member%error, kept)
-            call self%feed%keep(member%ticket, kept, stop_now)
-            self%stopped = self%stopped .or. stop_now
+            if (member%gave_up .and. member%choice%automatic) then
+               call begin_case(self, member%ticket, kept%case, .false., none)
+            else
+               if (.not. allocated(member%error)) &
+                  call keep_final(member%motion, member%t_end, member%y, member%keeper, member%error)
+               call conclude_case(self%sweep, member%keeper, member%late, member%error, kept)
+               call self%feed%keep(member%ticket, kept, stop_now)
+               self%stopped = self%stopped .or. stop_now
+            end if
          end associate
       end select
       deallocate (member)
