@@ -306,7 +306,8 @@ contains
       real(wp) :: lost_here
       integer :: j
 
-      call dynamics%scene%hinges%mechanisms(self%mechanism(i))%list_events(was, self%part(i), t, kinds, lost_here)
+      call dynamics%scene%hinges%mechanisms(self%mechanism(i))%list_events(was, self%part(i), self%theta(was%hinge), kinds, &
+                                                                           lost_here)
       do j = 1, size(kinds)
          if (allocated(error)) return
          call self%note(t, was%hinge, kinds(j), merge(lost_here, 0.0_wp, j == size(kinds)), error)

@@ -223,12 +223,13 @@ contains
    end subroutine change
 
    !> What has happened to a part since it `was` so: events, and the energy they cost. A stop keeps that of its face when it is
-   !> left, and gives back what the face still has when it is met.
-   pure subroutine list_events(self, was, part, t, kinds, lost)
+   !> left, and gives back what the face still has when it is met there. A joint that jumps into a stop, which has no face then,
+   !> has worked on it.
+   pure subroutine list_events(self, was, part, theta, kinds, lost)
       class(hinge_mechanism), intent(in) :: self
       type(hinge_mechanism), intent(in) :: was
       integer, intent(in) :: part
-      real(wp), intent(in) :: t
+      real(wp), intent(in) :: theta                 !! th now [rad]
       integer, allocatable, intent(out) :: kinds(:) !! in their order
       real(wp), intent(out) :: lost                 !! by the last of them [J]
       integer :: i
@@ -243,7 +244,7 @@ contains
          if (self%touches(i) .eqv. was%touches(i)) return
          if (self%touches(i)) then
             kinds = [merge(kind_at_lower, kind_at_upper, i == 1)]
-            lost = 0.0_wp - 0.5_wp*self%stop_stiffness*face_depth(was, i, t)**2 ! never -0
+            if (was%face(i) > 0.0_wp) lost = -0.5_wp*self%stop_stiffness*depth(self, i, theta)**2
          else
             kinds = [merge(kind_off_lower, kind_off_upper, i == 1)]
             lost = 0.5_wp*self%stop_stiffness*self%face(i)**2
