@@ -20,7 +20,7 @@ import style
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from rodyn_data import DataError, Sweep, distinct, open_run, open_sweep
-from sweep_lines import heading, mark_failed
+from sweep_lines import default_quantities, heading, mark_failed
 
 COUNTS = ("case.n_outputs", "chain.n_rods", "model.gauss_points")  # finer when larger
 DEFAULT_AXES = ("solver.fixed_step", "solver.rtol", *COUNTS)
@@ -49,8 +49,7 @@ def plot(file: str | pathlib.Path, out: str | pathlib.Path, quantities: Sequence
 
 
 def table_1_quantities(sweep: Sweep) -> list[str]:
-    n = sweep.file["phi"].shape[2] if "phi" in sweep.file else 1
-    return [f"phi({n})", "alpha_rate(1)"]
+    return [f"phi({sweep.n_rods})", "alpha_rate(1)"] if sweep.n_rods else default_quantities(sweep)[:2]
 
 
 def default_axis(sweep: Sweep) -> str:
@@ -110,7 +109,7 @@ def draw(sweep: Sweep, names: Sequence[str], axis: str, known: Sequence[float | 
     rows = -(-len(names) // columns)
     figure, grid = style.new_figure(rows, columns, height=0.9 + 2.9 * rows)
     than = "finest case of each line" if known[0] is None else "reference"
-    figure.suptitle(f"Convergence: {heading(sweep, time, where, 44)}; error against the {than}")
+    figure.suptitle(f"Convergence: {heading(sweep, names, time, where, 34)}; error against the {than}")
     figure.fits = {}
     for axes, name, value in zip(grid.flat, names, known, strict=False):
         figure.fits.update(draw_panel(axes, sweep, name, axis, value, where, time))
@@ -143,7 +142,7 @@ def draw_panel(axes: Axes, sweep: Sweep, name: str, axis: str, exact: float | No
         draw_line(axes, i, x, error, fit, series.label, rising)
     mark_failed(axes, failed, int(sweep.chosen(where).sum()))
     quantity = sweep.quantity(name, time)
-    axes.set(xlabel=sweep.axis_label(axis), ylabel=f"|error of {quantity.symbol}| [{quantity.unit}]")
+    axes.set(xlabel=sweep.axis_label(axis), ylabel=f"|error of {quantity.symbol}|" + (f" [{quantity.unit}]" if quantity.unit else ""))
     axes.set_title(quantity.meaning, loc="left")
     if not any(np.isfinite(line.get_ydata()).any() for line in axes.lines if line.get_marker() != "x"):
         style.note(axes, "no case differs from the reference")

@@ -17,7 +17,7 @@ import style
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from rodyn_data import DataError, Quantity, Sweep, open_sweep, text_of
-from sweep_lines import Places, default_axis, heading, mark_failed
+from sweep_lines import Places, default_axis, default_quantities, heading, mark_failed
 
 INERTIA = "model.inertia"
 KINDS = ("distributed", "lumped")
@@ -46,8 +46,7 @@ def plot(file: str | pathlib.Path, out: str | pathlib.Path, quantities: Sequence
 
 
 def table_3_quantities(sweep: Sweep) -> list[str]:
-    n = sweep.file["phi"].shape[2] if "phi" in sweep.file else 1
-    return [f"phi({k})" for k in sorted({1, n})] + ["displacement_x", "rotation"]
+    return [*sweep.states(), "displacement_x", "rotation"] if sweep.n_rods else default_quantities(sweep)
 
 
 def pair_up(sweep: Sweep, name: str, axis: str | None, where: Mapping[str, Any], time: float | None) -> tuple[str, Pair]:
@@ -80,7 +79,7 @@ def draw(sweep: Sweep, names: Sequence[str], axis: str | None, where: Mapping[st
     columns = min(2, len(names))
     rows = -(-len(names) // columns)
     figure, grid = style.new_figure(2 * rows, columns, width=style.WIDTH * (1.0 if columns > 1 else 0.6), height=0.8 + 3.6 * rows)
-    figure.suptitle(f"Exact and lumped inertia: {heading(sweep, time, where, 24 * columns)}")
+    figure.suptitle(f"Exact and lumped inertia: {heading(sweep, names, time, where, 24 * columns)}")
     total = int(sweep.chosen(where).sum())
     for i, name in enumerate(names):
         axis, pair = pair_up(sweep, name, axis, where, time)
@@ -106,7 +105,7 @@ def draw_difference(axes: Axes, x: np.ndarray, pair: Pair, failed: Sequence[floa
     """Its size, on a log axis."""
     size = np.abs(pair.difference)
     size[size == 0] = np.nan
-    axes.set_ylabel(f"|exact − lumped| [{pair.exact.unit}]")
+    axes.set_ylabel("|exact − lumped|" + (f" [{pair.exact.unit}]" if pair.exact.unit else ""))
     if np.all(np.isnan(size)):
         style.note(axes, "no difference")
         return

@@ -84,13 +84,20 @@ def of_sweep(file: str | pathlib.Path, sweep: Sweep) -> Iterator[Picture]:
     if not changing or not sweep.done.any():
         return
     paired = exact_lumped.INERTIA in changing and set(exact_lumped.KINDS) <= set(changing[exact_lumped.INERTIA])
-    if sweep_lines.count(sweep, sweep_lines.default_axis(sweep)) <= sweep_lines.MOST_LINES:
+    few = sweep_lines.count(sweep, sweep_lines.default_axis(sweep)) <= sweep_lines.MOST_LINES
+    if few and sweep.states():
         yield Picture("lines", "Angles of the first and the last rod.", lambda out: sweep_lines.plot(file, out))
+    if few and sweep.frequencies():
+        frequencies = sweep.frequencies()
+        yield Picture("frequencies", "The slowest natural frequencies.", lambda out: sweep_lines.plot(file, out, frequencies))
+    if not (sweep.states() or sweep.frequencies()):
+        return
     if paired and len(numbers) == 1:
         yield Picture("exact-lumped", "Distributed (exact) against lumped inertia, and their difference.",
                       lambda out: exact_lumped.plot(file, out))
     if len(changing) == 2 and not paired:
-        yield Picture("map", "The angle of the last rod over both axes.", lambda out: heat_map.plot(file, out))
+        what = "angle of the last rod" if sweep.states() else "slowest natural frequency"
+        yield Picture("map", f"The {what} over both axes.", lambda out: heat_map.plot(file, out))
     if any(name in numbers for name in convergence.DEFAULT_AXES):
         yield Picture("convergence", "Differences from the finest case, and fitted orders.", lambda out: convergence.plot(file, out))
 

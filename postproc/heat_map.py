@@ -22,11 +22,15 @@ from sweep_lines import default_quantities, heading
 
 def plot(file: str | pathlib.Path, out: str | pathlib.Path, quantity: str | None = None, axes: Sequence[str] = (),
          where: Mapping[str, Any] | None = None, time: float | None = None) -> Figure:
-    """By default the last rod's angle over the two axes with the most values."""
+    """By default the last rod's angle, or a frequency, over the two axes with the most values."""
     with open_sweep(file) as sweep:
-        figure = draw(sweep, quantity or default_quantities(sweep)[-1], axes or default_axes(sweep), where or {}, time)
+        figure = draw(sweep, quantity or default_quantity(sweep), axes or default_axes(sweep), where or {}, time)
     style.save(figure, out)
     return figure
+
+
+def default_quantity(sweep: Sweep) -> str:
+    return sweep.states()[-1] if sweep.states() else default_quantities(sweep)[0]
 
 
 def default_axes(sweep: Sweep) -> list[str]:
@@ -50,7 +54,7 @@ def draw(sweep: Sweep, name: str, names: Sequence[str], where: Mapping[str, Any]
     figure, grid = style.new_figure(width=0.85 * style.WIDTH, height=4.2)
     axes = grid[0, 0]
     meaning = quantity.meaning[:1].upper() + quantity.meaning[1:]
-    figure.suptitle(f"{meaning}: {heading(sweep, time, where, 40)}")
+    figure.suptitle(f"{meaning}: {heading(sweep, [name], time, where, 40)}")
     axes.grid(False)
     signed = np.nanmin(picture, initial=0.0) < 0 < np.nanmax(picture, initial=0.0)
     mesh = axes.pcolormesh(np.arange(len(values[0]) + 1) - 0.5, np.arange(len(values[1]) + 1) - 0.5, np.ma.masked_invalid(picture),

@@ -47,6 +47,7 @@ class Event(NamedTuple):
 
 
 TIME = "time"
+PROBE_TIME = "probe_time"  # of sweeps
 ROD_SYMBOLS = {
     "phi": r"\varphi", "alpha": r"\alpha", "beta": r"\beta",
     "phi_rate": r"\dot{\varphi}", "alpha_rate": r"\dot{\alpha}", "beta_rate": r"\dot{\beta}",
@@ -60,10 +61,12 @@ LEDGER_SYMBOLS = {
     "energy_kinetic": "T", "energy_elastic": r"\Pi", "energy_dissipated": "E_D", "work_external": "W",
     "energy_residual": "r_E", "momentum_x": "P_X", "momentum_y": "P_Y", "angular_momentum": "L",
 }
-SYMBOLS = ROD_SYMBOLS | SPACECRAFT_SYMBOLS | LEDGER_SYMBOLS
+MODE_SYMBOLS = {"frequency": r"\Omega", "damping_ratio": r"\zeta"}  # of sweeps
+MODES_SHOWN = 4  # without being asked
+SYMBOLS = ROD_SYMBOLS | SPACECRAFT_SYMBOLS | LEDGER_SYMBOLS | MODE_SYMBOLS
 UNITS = (
     dict.fromkeys(["phi", "alpha", "beta", "rotation"], "rad")
-    | dict.fromkeys(["phi_rate", "alpha_rate", "beta_rate", "omega"], "rad s-1")
+    | dict.fromkeys(["phi_rate", "alpha_rate", "beta_rate", "omega", "frequency"], "rad s-1")
     | dict.fromkeys(["velocity_x", "velocity_y", "bubble_rate"], "m s-1")
     | dict.fromkeys(["displacement_x", "displacement_y", "bubble"], "m")
 )
@@ -77,7 +80,7 @@ MEANINGS = {
     "energy_kinetic": "kinetic energy", "energy_elastic": "elastic energy", "energy_dissipated": "dissipated energy",
     "work_external": "work of loads and kinks", "energy_residual": "energy residual",
     "momentum_x": "linear momentum, inertial X", "momentum_y": "linear momentum, inertial Y",
-    "angular_momentum": "angular momentum",
+    "angular_momentum": "angular momentum", "frequency": "natural frequency", "damping_ratio": "damping ratio",
 }
 RATE_OF = {
     "phi": "phi_rate", "alpha": "alpha_rate", "beta": "beta_rate", "bubble": "bubble_rate",
@@ -302,7 +305,7 @@ class Sweep:
             raise DataError(f"{path}: is {kind}")
         self.status = texts(file["status"])
         self.axes = {name.removeprefix("param_"): column(file[name]) for name in file if name.startswith("param_")}
-        self.probe_times = np.atleast_1d(file["probe_time"][()]) if "probe_time" in file else np.array([np.nan])
+        self.probe_times = np.atleast_1d(file[PROBE_TIME][()]) if PROBE_TIME in file else np.array([np.nan])
 
     @property
     def title(self) -> str:
@@ -342,33 +345,68 @@ class Sweep:
             raise DataError(f"{self.path}: no probe time {t:g} s; it has {known} s")
         return i
 
-    def quantity(self, text: str, t: float | None = None) -> Quantity:
-        """A state at a probe time, 'phi(4)', or a number of each case, 'n_rhs'; NaN where a case has none."""
-        name, rod = split_name(text)
-        if name not in self.file or self.file[name].dtype.kind not in "fiu":
-            known = ", ".join(n for n in self.file if n in SYMBOLS or n in PARAMETERS)
-            raise DataError(f"{self.path}: no data set '{name}'; it has {known}")
+    @property
+    def n_rods(self) -> int:
+        """Rods of the longest chain; 0 if nothing was integrated."""
+        return self.file["phi"].shape[-1] if "phi" in self.file else 0
+
+    @property
+    def n_modes(self) -> int:
+        """Natural frequencies that some case has; 0 if none were wanted."""
+        return int(np.isfinite(self.file["frequency"][()]).any(axis=0).sum()) if "frequency" in self.file else 0
+
+    def states(self) -> list[str]:
+        """Quantities worth a first look: angles of the first and the last rod."""
+        return [f"phi({k})" for k in sorted({1, self.n_rods})] if self.n_rods else []
+
+    def frequencies(self) -> list[str]:
+        """The slowest natural frequencies."""
+        return [f"frequency({k})" for k in range(1, min(MODES_SHOWN, self.n_modes) + 1)]
+
+    def dimensions(self, name: str) -> list[str]:
+        """What the columns of a data set run over, as its dimension scales say: case first, then probe_time, rod, mode, ..."""
         data = self.file[name]
-        per_rod = data.ndim == 3 or name in FINAL_PER_ROD
-        if per_rod and rod is None:
-            raise DataError(f"{self.path}: '{name}' has one column per rod: write {name}(1) to {name}({data.shape[-1]})")
-        if not per_rod and rod is not None:
-            raise DataError(f"{self.path}: '{name}' does not belong to a rod: write {name}")
-        if rod is not None and not 1 <= rod <= data.shape[-1]:
-            raise DataError(f"{self.path}: no rod {rod}: the chains have rods 1 to {data.shape[-1]}")
-        if data.ndim == 1:
-            values = data[()].astype(float)
-        elif data.ndim == 2:
-            values = data[:, self.probe(t) if rod is None else rod - 1]
-        else:
-            values = data[:, self.probe(t), rod - 1]
-        values = np.where(self.done, values, np.nan)
+        found = [dimension[0].name.rpartition("/")[2] if len(dimension) else "" for dimension in data.dims]
+        if all(found):
+            return found
+        rest = ["rod"] if name in FINAL_PER_ROD else ["mode"] if name in MODE_SYMBOLS else ["probe_time", "rod"]
+        return ["case", *rest][: data.ndim]
+
+    def is_probed(self, text: str) -> bool:
+        """Does the quantity depend on the probe time?"""
+        name = split_name(text)[0]
+        return name in self.file and PROBE_TIME in self.dimensions(name)
+
+    def quantity(self, text: str, t: float | None = None) -> Quantity:
+        """A state at a probe time, 'phi(4)', or a number of each case, 'n_rhs', 'frequency(2)'; NaN where a case has none."""
+        name, number = split_name(text)
+        if name not in self.file or self.file[name].dtype.kind not in "fiu":
+            raise DataError(f"{self.path}: no data set '{name}'; it has {', '.join(n for n in self.file if self._has_number(n))}")
+        data = self.file[name]
+        of = self.dimensions(name)[1:]
+        if "row" in of:
+            raise DataError(f"{self.path}: '{name}' is a series in time, not a number of each case")
+        counted = next((what for what in of if what != PROBE_TIME), None)
+        columns = np.atleast_1d(self.file[counted][()]) if counted and counted in self.file else np.arange(1, data.shape[-1] + 1)
+        if counted and number is None:
+            raise DataError(f"{self.path}: '{name}' has one column per {counted}: write {name}({columns[0]}) to {name}({columns[-1]})")
+        if not counted and number is not None:
+            raise DataError(f"{self.path}: '{name}' does not belong to a rod or a mode: write {name}")
+        if counted and number not in columns:
+            whose = "chains" if counted == "rod" else "cases"
+            raise DataError(f"{self.path}: no {counted} {number}: the {whose} have {counted}s {columns[0]} to {columns[-1]}")
+        where = tuple(self.probe(t) if what == PROBE_TIME else int(np.flatnonzero(columns == number)[0]) for what in of)
+        values = np.where(self.done, data[(slice(None), *where)].astype(float), np.nan)
         state = name.removeprefix(FINAL)
-        words, unit = PARAMETERS.get(name, (symbol_text(state, rod), UNITS.get(state, "")))
+        words, unit = PARAMETERS.get(name, (symbol_text(state, number), UNITS.get(state, "")))
         unit = text_of(data.attrs.get("units", unit))
         unit = "" if unit in ("1", "none") else unit
-        meaning = MEANINGS.get(state, words) + ("" if rod is None else f" of rod {rod}") + (" at the end" if state != name else "")
+        meaning = MEANINGS.get(state, words) + (f" of {counted} {number}" if counted else "") + (" at the end" if state != name else "")
         return Quantity(text.replace(" ", ""), values, words, unit_text(unit), meaning)
+
+    def _has_number(self, name: str) -> bool:
+        """Is it a quantity of each case?"""
+        return name.removeprefix(FINAL) in SYMBOLS or name in PARAMETERS
 
     def axis_label(self, name: str) -> str:
         key, index = re.fullmatch(r"(.*?)(\(\d+\))?", name).groups()

@@ -23,7 +23,7 @@ MOST_LINES = 14
 
 def plot(file: str | pathlib.Path, out: str | pathlib.Path, quantities: Sequence[str] = (), axis: str | None = None,
          where: Mapping[str, Any] | None = None, time: float | None = None) -> Figure:
-    """One panel per quantity. By default angles of the first and last rod, against the first axis of numbers."""
+    """One panel per quantity. By default angles of the first and last rod, or frequencies, against the longest axis of numbers."""
     with open_sweep(file) as sweep:
         names = quantities or default_quantities(sweep)
         figure = draw(sweep, names, axis or default_axis(sweep), where or {}, time)
@@ -32,10 +32,10 @@ def plot(file: str | pathlib.Path, out: str | pathlib.Path, quantities: Sequence
 
 
 def default_quantities(sweep: Sweep) -> list[str]:
-    n = sweep.file["phi"].shape[2] if "phi" in sweep.file else 0
-    if not n:
-        raise DataError(f"{sweep.path}: no data set 'phi'; say with --quantity what to plot")
-    return [f"phi({k})" for k in sorted({1, n})]
+    found = sweep.states() or sweep.frequencies()
+    if not found:
+        raise DataError(f"{sweep.path}: neither states nor frequencies; say with --quantity what to plot")
+    return found
 
 
 def default_axis(sweep: Sweep) -> str:
@@ -55,7 +55,7 @@ def draw(sweep: Sweep, quantities: Sequence[str], axis: str, where: Mapping[str,
     columns = min(2, len(quantities))
     rows = -(-len(quantities) // columns)
     figure, grid = style.new_figure(rows, columns, height=0.9 + 2.5 * rows)
-    figure.suptitle(heading(sweep, time, where))
+    figure.suptitle(heading(sweep, quantities, time, where))
     for axes, name in zip(grid.flat, quantities, strict=False):
         draw_panel(axes, sweep, name, axis, where, time)
     for axes in grid.flat[len(quantities):]:
@@ -130,9 +130,9 @@ def probe_text(sweep: Sweep, time: float | None) -> str:
     return "" if np.isnan(t) else f"t = {t:g} s"
 
 
-def heading(sweep: Sweep, time: float | None, where: Mapping[str, Any], width: int = 60) -> str:
-    """Title of the sweep, probe time, fixed axes."""
-    parts = [style.shorten(sweep.title, width), probe_text(sweep, time)]
+def heading(sweep: Sweep, names: Sequence[str], time: float | None, where: Mapping[str, Any], width: int = 60) -> str:
+    """Title of the sweep, probe time if a quantity depends on it, fixed axes."""
+    parts = [style.shorten(sweep.title, width), probe_text(sweep, time) if any(map(sweep.is_probed, names)) else ""]
     return ", ".join(part for part in parts if part) + where_text(where)
 
 
@@ -142,7 +142,7 @@ def where_text(where: Mapping[str, Any]) -> str:
 
 def main() -> int:
     parser = command.parser(__doc__, "sweep file, or its directory")
-    parser.add_argument("-q", "--quantity", nargs="+", default=[], metavar="Q", help='such as "phi(4)", displacement_x, n_rhs')
+    parser.add_argument("-q", "--quantity", nargs="+", default=[], metavar="Q", help='such as "phi(4)", displacement_x, "frequency(2)", n_rhs')
     parser.add_argument("-a", "--axis", help="such as mass_ratio")
     command.add_where(parser)
     arguments = parser.parse_args()

@@ -1,11 +1,15 @@
 """Pictures of sweeps and benchmarks show the numbers of their files; failed cases stay visible."""
 
+import subprocess
+
 import convergence
 import exact_lumped
 import figures
+import h5py
 import heat_map
 import numpy as np
 import pytest
+import report
 import result_files
 import style
 import sweep_lines
@@ -151,6 +155,58 @@ def test_an_axis_that_goes_along_with_another_splits_nothing(tmp_path):
     path = result_files.write_sweep(tmp_path / "s.h5", axes, np.arange(4.0)[:, None, None] * np.ones((1, 1, 1)))
     figure = sweep_lines.plot(path, tmp_path / "x.png", axis="solver.rtol")
     assert {k: v[:, 1].tolist() for k, v in labelled(figure.axes[0]).items()} == {"adams": [1.0, 0.0], "bdf": [3.0, 2.0]}
+
+
+@pytest.fixture(scope="module")
+def frequencies(tmp_path_factory):
+    """A sweep of frequencies alone and one of states and frequencies, by the program."""
+    place = tmp_path_factory.mktemp("frequencies")
+    (place / "base.nml").write_text(result_files.case("Two rods", 2, n_outputs=20, t_end=0.1))
+    axis = "&axis key = 'chain.hinge_stiffness(0)', values = 1000, 2000, 4000 /\n"
+    mass = "&axis key = 'chain.node_mass', values = 1, 2 /\n"
+    for name, text in (("alone", "integrate = .false., frequencies = 9 /\n" + axis + mass),
+                       ("both", "probe_times = 0.02, 0.05, 0.1, frequencies = 3, keep_series = .true. /\n" + axis)):
+        (place / f"{name}.nml").write_text("&sweep base = 'base.nml', " + text)
+        done = subprocess.run([result_files.RODYN, "sweep", f"{name}.nml"], cwd=place, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+    return place
+
+
+def test_columns_are_those_that_the_file_says(frequencies, tmp_path):
+    """A mode is no probe time, and no rod."""
+    names = ["frequency(1)", "frequency(3)", "damping_ratio(2)", "phi(2)", "omega", "final_phi(1)"]
+    figure = sweep_lines.plot(frequencies / "both", tmp_path / "x.png", names, time=0.05)
+    drawn = [axes.lines[0].get_ydata() for axes in figure.axes]
+    with h5py.File(frequencies / "both" / "sweep.h5") as file:
+        wanted = [file["frequency"][:, 0], file["frequency"][:, 2], file["damping_ratio"][:, 1], file["phi"][:, 1, 1],
+                  file["omega"][:, 1], file["final_phi"][:, 0]]
+    for ours, right in zip(drawn, wanted, strict=True):
+        assert np.array_equal(ours, right)
+    assert figure.axes[1].get_title(loc="left") == "natural frequency of mode 3"
+    assert figure.axes[1].get_ylabel().endswith("[rad/s]")
+    assert "t = 0.05 s" in figure.get_suptitle()
+    figure = convergence.plot(frequencies / "both", tmp_path / "x.png", ["frequency(2)"], "chain.hinge_stiffness(0)")
+    assert "t = " not in figure.get_suptitle()  # frequencies have no probe time
+    with pytest.raises(DataError, match=r"write frequency\(1\) to frequency\(3\)"):
+        sweep_lines.plot(frequencies / "both", tmp_path / "x.png", ["frequency"])
+    with pytest.raises(DataError, match="no mode 4: the cases have modes 1 to 3"):
+        sweep_lines.plot(frequencies / "both", tmp_path / "x.png", ["frequency(4)"])
+    with pytest.raises(DataError, match="'series_omega' is a series in time"):
+        sweep_lines.plot(frequencies / "both", tmp_path / "x.png", ["series_omega"])
+
+
+def test_a_sweep_of_frequencies_has_pictures_and_a_report(frequencies, tmp_path, monkeypatch):
+    monkeypatch.setattr(style, "FORMATS", (".png",))
+    paths = figures.plot(frequencies / "alone", tmp_path / "alone")
+    assert {path.stem.removeprefix("alone-") for path in paths} == {"frequencies", "map"}
+    paths = figures.plot(frequencies / "both", tmp_path / "both")
+    assert {path.stem.removeprefix("both-") for path in paths} == {"lines", "frequencies"}
+    figure = heat_map.plot(frequencies / "alone", tmp_path / "x.png")
+    with h5py.File(frequencies / "alone" / "sweep.h5") as file:
+        assert np.array_equal(np.sort(figure.axes[0].collections[0].get_array().ravel()), np.sort(file["frequency"][:, 0]))
+    report.plot(frequencies / "alone", tmp_path / "report.html")
+    page = (tmp_path / "report.html").read_text()
+    assert page.count("<figure>") == 2 and "Not drawn" not in page
 
 
 def test_equal_cases_are_said_to_be_equal(tmp_path):
