@@ -8,7 +8,7 @@ module rodyn_posix
    private
    public :: posix_close, posix_closedir, posix_fsync, posix_open, posix_opendir, posix_signal, sig_ign ! for `rodyn_posix_files`
    public :: read_all
-   public :: process_id, host_name, utc_now
+   public :: process_id, parent_id, host_name, utc_now
    public :: path_exists, same_path, is_directory, is_special, is_writable, parent_directory
    public :: sync_path, rename_over, rename_new, remove_file
    public :: ignore_signal, sigpipe, sigxfsz, write_output, write_text, standard_output, standard_error
@@ -27,6 +27,12 @@ module rodyn_posix
          implicit none (type, external)
          integer(c_int) :: pid
       end function posix_getpid
+
+      function posix_getppid() result(pid) bind(c, name='getppid')
+         import :: c_int
+         implicit none (type, external)
+         integer(c_int) :: pid
+      end function posix_getppid
 
       function posix_gethostname(name, length) result(status) bind(c, name='gethostname')
          import :: c_char, c_int, c_size_t
@@ -213,6 +219,12 @@ contains
       integer :: pid
       pid = int(posix_getpid())
    end function process_id
+
+   !> Number of the process that started this one.
+   function parent_id() result(pid)
+      integer :: pid
+      pid = int(posix_getppid())
+   end function parent_id
 
    !> Name of this machine; 'unknown' if the system does not tell.
    function host_name() result(name)

@@ -10,6 +10,7 @@ module rodyn_sweep_ranks
       mpi_iprobe, mpi_mode_nocheck, mpi_status_ignore, mpi_sum, mpi_win, mpi_win_allocate, mpi_win_flush, &
       mpi_win_free, mpi_win_lock_all, mpi_win_unlock_all
    use rodyn_kinds, only: i8
+   use rodyn_launcher, only: launched_processes
    implicit none (type, external)
    private
    public :: rank_group, at_next, at_done, at_failed, at_stopped, at_errors
@@ -49,8 +50,7 @@ contains
       type(c_ptr) :: base
       integer(mpi_address_kind) :: bytes
 
-      self%launched = max(number_in('OMPI_COMM_WORLD_SIZE'), number_in('PMI_SIZE'), number_in('SLURM_STEP_NUM_TASKS'), &
-                          number_in('MPI_LOCALNRANKS'), 1)
+      self%launched = launched_processes()
       if (self%launched == 1) return
       call mpi_init()
       call mpi_comm_rank(mpi_comm_world, self%rank)
@@ -66,19 +66,6 @@ contains
       call mpi_barrier(mpi_comm_world)
       call mpi_win_lock_all(mpi_mode_nocheck, self%window)
    end subroutine start
-
-   !> A whole number in the environment; 0: none.
-   integer function number_in(name)
-      character(len=*), intent(in) :: name
-      character(len=20) :: text
-      integer :: length, stat
-
-      number_in = 0
-      call get_environment_variable(name, text, length, stat)
-      if (stat /= 0 .or. length == 0) return
-      read (text, *, iostat=stat) number_in
-      if (stat /= 0) number_in = 0
-   end function number_in
 
    !> All ranks together: the end.
    subroutine finish(self)
