@@ -41,14 +41,14 @@ contains
    subroutine unknown_group(error)
       type(error_type), allocatable, intent(out) :: error
       call expect_faults(error, &
-         valid//'&solvr rtol = 1 /', &
+         valid//'&solvr rtol = 0.1 /', &
          'c.nml:3: &solvr: unknown group; the nearest known one is &solver')
    end subroutine unknown_group
 
    subroutine unknown_key(error)
       type(error_type), allocatable, intent(out) :: error
       call expect_faults(error, &
-         valid//'&solver rtoll = 1 /', &
+         valid//'&solver rtoll = 0.1 /', &
          'c.nml:3: &solver rtoll: unknown key; the nearest known one is rtol')
    end subroutine unknown_key
 
@@ -137,7 +137,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       call expect_faults(error, &
          valid//'&initial phi(2) = 1, 2 /', &
-         'c.nml:3: &initial phi(2) = 1, 2: takes one value, not 2')
+         'c.nml:3: &initial phi(2) = 1, 2: takes one value, not 2; write phi(2:3) for all')
    end subroutine element_count
 
    subroutine wrong_types(error)

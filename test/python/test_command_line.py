@@ -345,6 +345,97 @@ def test_an_endless_or_binary_stream_is_refused(tmp_path):
     assert result.stderr == "standard input: an HDF5 file cannot be read from a pipe; give its name\n"
 
 
+# Several processes started together
+
+
+LAUNCHERS = [{"OMPI_COMM_WORLD_SIZE": "2", "OMPI_COMM_WORLD_RANK": "%d"}, {"PMI_SIZE": "2", "PMI_RANK": "%d"},
+             {"SLURM_STEP_NUM_TASKS": "2", "SLURM_NTASKS": "2", "SLURM_PROCID": "%d"}]
+
+
+def as_rank(launcher: dict[str, str], rank: int) -> dict[str, str]:
+    return os.environ | {name: value.replace("%d", str(rank)) for name, value in launcher.items()}
+
+
+@pytest.mark.parametrize("launcher", LAUNCHERS, ids=lambda launcher: next(iter(launcher)))
+def test_one_process_computes_a_case_and_one_speaks(tmp_path, launcher):
+    write_case(tmp_path, SCENES["one rod"])
+    for rank in (0, 1):
+        for command in ("run", "modes"):
+            result = rodyn(command, "case.nml", cwd=tmp_path, env=as_rank(launcher, rank))
+            assert (result.returncode, result.stdout) == (2, "")
+            assert result.stderr.startswith(f"rodyn {command}: 2 processes were started together") if rank == 0 else not result.stderr
+        for arguments in (["check", "case.nml"], ["defaults"], ["--version"], ["run", "--help"], ["sweep", "--help"]):
+            result = rodyn(*arguments, cwd=tmp_path, env=as_rank(launcher, rank))
+            assert (result.returncode, result.stderr) == (0, "")
+            assert bool(result.stdout) is (rank == 0), arguments
+    assert files(tmp_path) == ["case.nml"]
+
+
+@pytest.mark.parametrize("launcher", LAUNCHERS, ids=lambda launcher: next(iter(launcher)))
+def test_a_script_that_was_started_several_times_knows_what_it_does(tmp_path, launcher):
+    """As in `mpirun -n 2 script` with a case for each rank, or a shell in a job of several tasks."""
+    write_case(tmp_path, SCENES["one rod"])
+    for rank in (0, 1):
+        done = subprocess.run(["sh", "-c", f"{RODYN} run case.nml --output {rank}.h5; exit $?"], cwd=tmp_path,
+                              env=as_rank(launcher, rank), capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+    assert files(tmp_path) == ["0.h5", "1.h5", "case.nml"]
+
+
+def test_a_job_of_several_tasks_is_no_reason_to_refuse(tmp_path):
+    """A job script or shell of Slurm is one process, whatever the tasks of the job."""
+    write_case(tmp_path, SCENES["one rod"])
+    job = os.environ | {"SLURM_NTASKS": "8", "SLURM_PROCID": "0", "SLURM_JOB_ID": "1", "SLURM_NPROCS": "8"}
+    assert rodyn("run", "case.nml", cwd=tmp_path, env=job).returncode == 0
+
+
+@pytest.mark.skipif(shutil.which("mpirun") is None, reason="no mpirun")
+def test_mpirun_does_not_run_a_case_twice(tmp_path):
+    write_case(tmp_path, SCENES["one rod"])
+    root = os.environ | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    for command, code, words in (("run", 2, "2 processes were started together"), ("check", 0, "case.nml: valid")):
+        result = subprocess.run(["mpirun", "--oversubscribe", "-n", "2", RODYN, command, "case.nml"], cwd=tmp_path, env=root,
+                                capture_output=True, text=True)
+        assert result.returncode == code and (result.stdout + result.stderr).count(words) == 1
+    assert files(tmp_path) == ["case.nml"]
+
+
+# What is allowed but hardly meant
+
+
+def test_what_hardly_can_be_meant_is_noted(tmp_path):
+    text = (TIMES + SPACECRAFT + CHAIN + "&load component = 'M', value = 5, t_start = 2, t_end = 3 /\n&load component = 'X' , value = 0 /\n"
+            + "&load component = 'Y', law = 'table', times = 0, 1, values = 0, 0 /\n" + MOMENT
+            + "&initial phi = 0.1, 45, -90, rotation = 7.1 /\n&hinge hinge = 1, held = .true., release_time = 5 /\n")
+    notes = ["&load, number 1, never acts: it begins at t = 2 s, and the case ends at 0.05 s",
+             "&load, number 2, never acts: its value is 0", "&load, number 3, never acts: all its values are 0",
+             "&hinge, hinge 1, is never released: release_time = 5 s is after the end of the case, 0.05 s",
+             "&initial phi = 45 rad is 7.161972 turns; if degrees were meant, write 0.785398"]
+    case = write_case(tmp_path, text)
+    check = rodyn("check", case.name, cwd=tmp_path)
+    assert (check.returncode, check.stdout.splitlines()) == (0, ["case.nml: valid", *(f"note    {note}" for note in notes)])
+    result = rodyn("run", case.name, cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert [line[8:] for line in result.stdout.splitlines() if line.startswith("note ")][:5] == notes
+    with h5py.File(tmp_path / "case.h5") as file:
+        assert file.attrs["notes"].decode().splitlines()[:5] == notes
+    modes = rodyn("modes", case.name, cwd=tmp_path)
+    assert modes.returncode == 0, modes.stderr
+    with h5py.File(tmp_path / "case_modes.h5") as file:
+        assert file.attrs["notes"].decode().splitlines()[:1] == notes[4:]  # nothing acts there
+
+
+def test_numbers_in_messages_are_whole(tmp_path):
+    """Exponents of three digits keep their E, numbers below 1 their zero."""
+    write_case(tmp_path, (TIMES + SPACECRAFT + CHAIN + MOMENT).replace("0.05", "1e-300").replace("t_end = 0.02", "t_end = 1e-301"))
+    out = rodyn("run", "case.nml", cwd=tmp_path).stdout
+    assert "t = 1E-300 s" in out and not re.search(r"\d[-+]\d{3}\b", out), out
+    (tmp_path / "s.nml").write_text("&sweep base = 'base.nml' /\n&axis key = 'solver.rtol', values = 1e-6, 1e-7 /\n")
+    write_case(tmp_path, SCENES["one rod"], "base.nml")
+    out = rodyn("sweep", "s.nml", cwd=tmp_path).stdout
+    assert re.search(r"^cost    \d+\.\d+ s of integration in \d+\.\d+ s on 1 process$", out, re.MULTILINE), out
+
+
 # Names of results
 
 

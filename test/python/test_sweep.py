@@ -756,7 +756,7 @@ def test_defaults_are_a_valid_sweep(here):
     ("&sweep base = 'base.nml' /\n&axis key = 'solver.method', text_values = 'rk4' /", "must be 'auto'"),
     ("&sweep base = 'base.nml' /\n&axis key = 'solver.method', values = 1 /", "takes text_values"),
     ("&sweep base = 'base.nml' /\n&axis key = 'case.n_outputs', values = 1.5 /", "must be a whole number"),
-    ("&sweep base = 'base.nml' /\n&axis key = 'case.t_end', values = 1, -1 /", "value 2 (-1.0"),
+    ("&sweep base = 'base.nml' /\n&axis key = 'case.t_end', values = 1, -1 /", "value 2 (-1) must be positive [s]"),
     ("&sweep base = 'base.nml' /\n&axis key = 'load.value', values = 1 /", "load(1).value"),
     ("&sweep base = 'base.nml' /\n&axis key = 'output.file', text_values = 'x' /", "has no influence"),
     ("&sweep base = 'base.nml' /\n&axis key = 'case.t_end', start = 0, stop = 1, count = 3, spacing = 'log' /", "positive start"),
@@ -771,6 +771,82 @@ def test_faults_are_told_with_their_line(here, text, message):
     check = subprocess.run([RODYN, "check", "s.nml"], cwd=here, capture_output=True, text=True)
     assert check.returncode == 2 and message in check.stderr
     assert not (here / "s").exists()
+
+
+def faults(here: pathlib.Path, text: str) -> list[str]:
+    (here / "s.nml").write_text(text)
+    check = subprocess.run([RODYN, "check", "s.nml"], cwd=here, capture_output=True, text=True)
+    assert (check.returncode, check.stdout) == (2, "")
+    return check.stderr.splitlines()
+
+
+SWEEP = "&sweep base = 'base.nml' /\n"
+GOOD = "&axis key = 'chain.hinge_stiffness(0)', values = 1e3, 2e3 /\n"
+
+
+@pytest.mark.parametrize("combine", ["grid", "zip"])
+def test_a_bad_axis_is_blamed_alone(here, combine):
+    """Also where its first value is the bad one, with which all values of the others would be tried."""
+    bad = "&axis key = 'model.gauss_points', values = 1, 4 /\n"
+    for order in (bad + GOOD, GOOD + bad):
+        lines = faults(here, SWEEP.replace(" /", f", combine = '{combine}' /") + order)
+        assert len(lines) == 1, lines
+        assert "&axis key = 'model.gauss_points': value 1 (1) makes a case that is refused: base.nml: &model gauss_points = 1" in lines[0]
+
+
+def test_every_fault_of_a_sweep_is_told_at_once(here):
+    lines = faults(here, "&sweep base = 'base.nml', probe_tims = 1 /\n" + GOOD + "&axis key = 'chain.lenght(1)', values = 1 /\n"
+                   "&axis key = 'case.t_end', values = 1, -1, 2, -3 /\n&axis ky = 'solver.rtol', values = 1e-5 /\n"
+                   "&axis key = 'model.bending', text_values = 'rigid', 'stiff' /\n&axis key = 'solver.order', values = 0, 3 /\n")
+    words = [":1: &sweep probe_tims: unknown key", ":3: &axis key = 'chain.lenght(1)': &chain has no such key",
+             ":4: &axis values = 1, -1, 2, -3: value 2 (-1) must be positive [s]",
+             ":4: &axis values = 1, -1, 2, -3: value 4 (-3) must be positive [s]", ":5: &axis ky: unknown key",
+             ":6: &axis text_values = 'rigid', 'stiff': value 2 ('stiff') must be 'dynamic'",
+             ":7: &axis key = 'solver.order': value 2 (3) makes a case that is refused"]
+    told = [line for line in lines if "&axis key: is required" not in line]
+    assert len(told) == len(words), lines
+    for line, word in zip(told, words, strict=True):
+        assert word in line
+
+
+def test_faults_of_sweep_and_base_do_not_hide_each_other(here):
+    axis = "&axis key = 'chain.lenght(1)', values = 1 /\n&axis key = 'case.t_end', values = -1 /\n"
+    lines = faults(here, "&sweep base = 'none.nml' /\n" + axis)
+    assert [line.split(": ")[0] for line in lines] == ["s.nml:1", "s.nml:2", "s.nml:3"] and "cannot be read" in lines[0]
+    (here / "bad.nml").write_text((here / "base.nml").read_text() + "&case t_end = -1 /\n")
+    lines = faults(here, "&sweep base = 'bad.nml' /\n" + axis)
+    assert [line.split(":")[0] for line in lines][:2] == ["s.nml", "s.nml"] and any(line.startswith("bad.nml:") for line in lines)
+
+
+def test_check_says_what_it_tried(here):
+    def valid(text):
+        (here / "s.nml").write_text(text)
+        check = subprocess.run([RODYN, "check", "s.nml"], cwd=here, capture_output=True, text=True)
+        assert check.returncode == 0, check.stderr
+        return check.stdout
+
+    assert valid(SWEEP + GOOD) == "s.nml: valid; each of 2 values tried\n"
+    assert valid(SWEEP + GOOD + "&axis key = 'solver.rtol', values = 1e-6, 1e-8, 1e-9 /\n") == (
+        "s.nml: valid; each of 5 values tried; a combination that is refused fails as a case\n")
+    many = "&axis key = 'solver.rtol', start = 1e-9, stop = 1e-3, count = 10000 /\n"
+    assert valid(SWEEP + many) == "s.nml: valid; each of 10000 values tried\n"
+    assert "10000 of 10001 values tried" in valid(SWEEP + many.replace("10000", "10001"))
+    # rules of the key itself are kept by all, the last value is tried whatever their number
+    lines = faults(here, SWEEP + "&axis key = 'chain.hinge_damping(0)', start = 1, stop = -1e-9, count = 10002 /\n")
+    assert ": value 10002 (-0.1E-8) must not be negative" in lines[0] and len(lines) == 1
+    lines = faults(here, SWEEP + "&axis key = 'model.gauss_points', start = 40000, stop = 1, count = 40000 /\n")
+    assert any("must lie in 1..200" in line for line in lines) and "value 40000 (1) makes a case that is refused" in lines[-1]
+    some = [many.replace("10000", "500").replace("solver.rtol", key) for key in ("solver.rtol", "solver.atol", "load(1).value")]
+    lines = faults(here, SWEEP.replace(" /", ", probe_times = 0.01 /") + "".join(some))
+    assert lines == ["s.nml: more than 100000000 cases"]
+
+
+def test_a_combination_that_is_refused_is_no_fault_but_one_that_always_is(here):
+    method = "&axis key = 'solver.method', text_values = 'bdf', 'erk' /\n"
+    (here / "s.nml").write_text(SWEEP + method + "&axis key = 'solver.order', values = 8, 4 /\n")
+    assert subprocess.run([RODYN, "check", "s.nml"], cwd=here, capture_output=True).returncode == 0
+    lines = faults(here, SWEEP + method.replace("'erk'", "'gauss'") + "&axis key = 'solver.order', values = 8 /\n")
+    assert all("&axis key = 'solver" in line for line in lines) and "solver order = 8" in "".join(lines)
 
 
 def test_shipped_sweeps_are_valid():

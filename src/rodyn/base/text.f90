@@ -5,7 +5,7 @@ module rodyn_text
    implicit none (type, external)
    private
    public :: lower, is_name, is_digit
-   public :: to_text, formatted, short_text, quoted, printable, as_utf8, ends_with
+   public :: to_text, formatted, tidy, short_text, quoted, printable, as_utf8, ends_with
    public :: edit_distance, word_count, word
 
    !> A number as the shortest text (integer), or with 17 significant digits (real), or as T or F.
@@ -197,9 +197,30 @@ contains
       character(len=*), intent(in) :: format !! such as '(f8.1)'; at most 32 characters wide
       character(len=:), allocatable :: text
       character(len=32) :: digits
+      integer :: sign
+
       write (digits, format) x
+      if (index(digits, '*') > 0) write (digits, '(es16.6)') x ! too wide for the format
       text = trim(adjustl(digits))
       if (text(1:1) == '.') text = '0'//text ! which some compilers leave out
+      if (index(text, '-.') == 1) text = '-0'//text(2:)
+      sign = scan(text(2:), '+-')            ! and the E of exponents of three digits
+      if (sign == 0) return
+      if (is_digit(text(sign:sign))) text = text(:sign)//'E'//text(sign + 1:)
    end function formatted
+
+   !> A number without idle zeros: 1.500E-05 as 1.5E-05.
+   pure function tidy(number) result(text)
+      character(len=*), intent(in) :: number !! as `formatted` gives it
+      character(len=:), allocatable :: text
+      integer :: exponent, last
+
+      exponent = scan(number, 'E')
+      if (exponent == 0) exponent = len(number) + 1
+      last = exponent - 1
+      if (index(number(:last), '.') > 0) last = verify(number(:last), '0', back=.true.)
+      if (number(last:last) == '.') last = last - 1
+      text = number(:last)//number(exponent:)
+   end function tidy
 
 end module rodyn_text

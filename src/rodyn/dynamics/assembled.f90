@@ -13,6 +13,7 @@ module rodyn_assembled
    use rodyn_bending_matrices, only: most_shapes
    use rodyn_locks, only: has_slaves, reduce, expand, reduce_matrix, reactions
    use rodyn_lapack, only: dpotrf, dpotrs, dgesv, dgemv
+   use rodyn_text, only: formatted
    implicit none (type, external)
    private
    public :: assembled_system, new_assembled_system, mass_matrix, assembled_accelerations
@@ -43,7 +44,6 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: b(:, :), c(:, :), r(:, :)
       real(wp) :: factor(0:scene%n - 1), angle(0:scene%n - 1)
-      character(len=32) :: size_text
       integer :: status, n_dof, n, k
 
       n = scene%n
@@ -53,8 +53,8 @@ contains
                 system%static(2, n), system%axial(2, n), system%outboard(0:n), &
                 b(0:n - 1, n_dof), c(0:n - 1, n_dof), r(0:n - 1, n_dof), stat=status)
       if (status /= 0) then
-         write (size_text, '(f0.1, " GiB")') 4.75_wp*8.0_wp*real(n_dof, wp)**2/1024.0_wp**3
-         call raise(error, "kernel = 'assembled' needs "//trim(size_text)//" for this scene; use 'recursive'")
+         call raise(error, "kernel = 'assembled' needs "//formatted(4.75_wp*8.0_wp*real(n_dof, wp)**2/1024.0_wp**3, '(f0.1)')// &
+                    " GiB for this scene; use 'recursive'")
          return
       end if
       system%damped = scene%hinges%has_damping

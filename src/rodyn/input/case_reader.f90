@@ -73,7 +73,12 @@ contains
       type(field_loader) :: loader
 
       call match_document(document, case_groups, case_rows, checked)
-      call check_document(checked, case_extents(rods_of(checked)))
+      if (.not. document%readable) then
+         call checked%faults%to_error(document%name, error)
+         return
+      end if
+      call check_document(checked, case_extents(rods_of(checked, presumed=.true.)))
+      checked%extents = case_extents(rods_of(checked, presumed=.false.))
       loader%checked => checked
       allocate (config%profiles(instances(checked, 'rod_profile')), config%loads(instances(checked, 'load')), &
                 config%kink_programs(instances(checked, 'kink_program')), config%hinges(instances(checked, 'hinge')))
@@ -85,13 +90,16 @@ contains
       call checked%faults%to_error(document%name, error)
    end subroutine case_from_document
 
-   !> The number of rods if it is given rightly, else 0: everything that depends on it is then left unchecked.
-   integer function rods_of(checked)
+   !> The number of rods if it is given rightly, or at least by a misspelt key, else 0: everything that depends on it is then left
+   !> unchecked.
+   integer function rods_of(checked, presumed)
       type(checked_document), intent(in) :: checked
+      logical, intent(in) :: presumed !! a misspelt key will do
       integer :: e
 
       rods_of = 0
       e = entry_of(checked, 'chain', 1, 'n_rods')
+      if (e == 0 .and. presumed) e = findloc(checked%row == row_index(case_rows, 'chain', 'n_rods'), .true., 1)
       if (e == 0) return
       associate (entry => checked%document%entries(e), values => checked%document%values)
          if (entry%first /= entry%last .or. values(entry%first)%kind /= is_integer) return

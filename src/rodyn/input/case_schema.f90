@@ -135,8 +135,9 @@ module rodyn_case_schema
          when="required when law = 'table'", help='increasing times, two at least'), &
       schema_row('load', 'values', type_real, any_list, 'N or N m', 'depends', &
          when="required when law = 'table'", help='value at each of the times, linear in between'), &
-      schema_row('load', 'after', type_word, default="'zero'", words='zero|hold', &
-         help="law = 'table': the load beyond its last time, until t_end; before its first time it is zero"), &
+      schema_row('load', 'after', type_word, default='depends', words='zero|hold', example="'zero'", &
+         when="law = 'table'; default: 'zero'", &
+         help='the load beyond its last time, until t_end; before its first time it is zero'), &
       schema_row('kink_program', 'hinge', type_integer, rule=not_negative, example='0', &
          help='hinge 0..n-1 whose kink moves'), &
       schema_row('kink_program', 'law', type_word, default="'smooth_step'", words='ramp|smooth_step|sine|table', &

@@ -6,8 +6,8 @@
 module rodyn_checked_document
    use rodyn_faults, only: fault_list
    use rodyn_namelist_document, only: namelist_document, index_text, shown_values
-   use rodyn_schema, only: schema_extent, schema_group, schema_row, group_index, nearest_group, nearest_key, &
-      row_index
+   use rodyn_schema, only: schema_extent, schema_group, schema_row, group_index, misspelt_group, misspelt_key, nearest_group, &
+      nearest_key, row_index
    use rodyn_text, only: printable, to_text
    implicit none (type, external)
    private
@@ -19,16 +19,18 @@ module rodyn_checked_document
       type(schema_group), allocatable :: groups(:)
       type(schema_row), allocatable :: rows(:)
       type(schema_extent), allocatable :: extents(:)
-      integer, allocatable :: known(:)  !! the document's groups, those of the first schema group first
+      integer, allocatable :: known(:)  !! the document's groups, those of the first schema group first; misspelt ones where they
+                                        !! seem to belong
       integer, allocatable :: before(:) !! how many of `known` stand before those of each schema group (0:)
-      integer, allocatable :: row(:)  !! of each entry; 0: unknown key
+      integer, allocatable :: row(:)  !! of each entry, also of a misspelt key; 0: none is near
       logical, allocatable :: ok(:)   !! of each entry: known, and its values keep the rules
       type(fault_list) :: faults
    end type checked_document
 
 contains
 
-   !> Find the row of every entry; unknown and repeated groups and unknown keys are faults.
+   !> Find the row of every entry; unknown and repeated groups and unknown keys are faults. What is misspelt is then taken for
+   !> what is near, so that its own faults are found, too, and nothing is missed that is there.
    subroutine match_document(document, groups, rows, checked)
       type(namelist_document), intent(in), target :: document
       type(schema_group), intent(in) :: groups(:)
@@ -45,11 +47,8 @@ contains
       call sort_groups(checked)
       do i = 1, size(checked%known)
          g = checked%known(i)
-         if (i > checked%before(size(groups))) then
-            call complain_of_group(checked, g)
-         else
-            call match_entries(checked, g)
-         end if
+         if (group_index(groups, document%groups(g)%name) == 0) call complain_of_group(checked, g)
+         if (i <= checked%before(size(groups))) call match_entries(checked, g, groups(count(checked%before < i))%name)
       end do
       call check_single_groups(checked)
    end subroutine match_document
@@ -66,7 +65,13 @@ contains
       allocate (kind(checked%document%n_groups))
       do g = 1, size(kind)
          kind(g) = group_index(checked%groups, checked%document%groups(g)%name)
-         if (kind(g) == 0) kind(g) = n + 1
+      end do
+      do g = 1, size(kind)
+         if (kind(g) > 0) cycle
+         k = group_index(checked%groups, misspelt_group(checked%groups, checked%document%groups(g)%name))
+         kind(g) = n + 1
+         if (k == 0) cycle
+         if (checked%groups(k)%repeatable .or. .not. any(kind == k)) kind(g) = k
       end do
       allocate (checked%known(size(kind)))
       allocate (checked%before(0:n), source=0)
@@ -130,39 +135,57 @@ contains
       end associate
    end subroutine complain_of_group
 
-   subroutine match_entries(checked, g)
+   subroutine match_entries(checked, g, group)
       type(checked_document), intent(inout) :: checked
       integer, intent(in) :: g
-      integer :: e
+      character(len=*), intent(in) :: group !! what it is, or seems to be
+      integer :: e, r
 
-      associate (document => checked%document)
-         do e = document%groups(g)%first, document%groups(g)%last
-            checked%row(e) = row_index(checked%rows, trim(document%groups(g)%name), trim(document%entries(e)%key))
+      associate (document => checked%document, first => checked%document%groups(g)%first, last => checked%document%groups(g)%last)
+         do e = first, last
+            checked%row(e) = row_index(checked%rows, trim(group), trim(document%entries(e)%key))
             checked%ok(e) = checked%row(e) > 0 .and. .not. document%entries(e)%faulty
-            if (checked%row(e) == 0 .and. .not. document%entries(e)%faulty) call complain_of_key(checked, g, e)
+         end do
+         do e = first, last
+            if (checked%row(e) > 0 .or. document%entries(e)%faulty) cycle
+            call complain_of_key(checked, g, e, trim(group))
+            r = row_index(checked%rows, trim(group), misspelt_key(checked%rows, trim(group), document%entries(e)%key))
+            if (r > 0 .and. .not. any(checked%row(first:last) == r)) checked%row(e) = r
          end do
       end associate
    end subroutine match_entries
 
    !> Name the group that has such a key, or else the nearest key of this group.
-   subroutine complain_of_key(checked, g, e)
+   subroutine complain_of_key(checked, g, e, group)
       type(checked_document), intent(inout) :: checked
       integer, intent(in) :: g, e
+      character(len=*), intent(in) :: group !! what it is, or seems to be
       character(len=:), allocatable :: hint
       integer :: r
 
       hint = ''
-      associate (key => checked%document%entries(e)%key, group => checked%document%groups(g)%name)
+      associate (key => checked%document%entries(e)%key)
          if (.not. checked%faults%full()) then
-            hint = 'the nearest known one is '//nearest_key(checked%rows, trim(group), trim(key))
+            hint = 'the nearest known one is '//nearest_key(checked%rows, group, trim(key))
             do r = size(checked%rows), 1, -1
                if (checked%rows(r)%key == key) hint = 'it belongs to &'//trim(checked%rows(r)%group)
             end do
          end if
-         call checked%faults%add(checked%document%entries(e)%line, '&'//trim(group)//' '//trim(key)// &
+         call checked%faults%add(checked%document%entries(e)%line, '&'//trim(checked%document%groups(g)%name)//' '//trim(key)// &
             index_text(checked%document%entries(e))//': unknown key; '//hint)
       end associate
    end subroutine complain_of_key
+
+   !> Does the key stand in some group that does not take it? Then that is the fault, not that it is missing.
+   logical function is_misplaced(checked, key)
+      type(checked_document), intent(in) :: checked
+      character(len=*), intent(in) :: key
+      integer :: e
+      is_misplaced = .false.
+      do e = 1, size(checked%row)
+         is_misplaced = is_misplaced .or. (checked%row(e) == 0 .and. checked%document%entries(e)%key == key)
+      end do
+   end function is_misplaced
 
    !> The entry that gives a key rightly in the `instance`-th group of that name; 0 if there is none.
    integer function entry_of(checked, group, instance, key) result(found)
@@ -245,6 +268,7 @@ contains
       integer, intent(in) :: instance
       character(len=*), intent(in) :: when !! as in 'is required '//when; empty: always
       if (is_given(checked, group, instance, key)) return
+      if (is_misplaced(checked, key)) return
       call blame(checked, group, instance, key, trim('is required '//when))
    end subroutine require
 

@@ -2,8 +2,9 @@
 module rodyn_document_checks
    use rodyn_kinds, only: i8
    use rodyn_checked_document, only: checked_document, instances, no_such, require
-   use rodyn_namelist_document, only: namelist_document, namelist_entry, index_text, shown_value, shown_values
-   use rodyn_schema, only: schema_extent, any_list, group_index, one_value
+   use rodyn_namelist_document, only: namelist_document, namelist_entry, index_text, is_integer, is_long_integer, is_string, &
+      is_word, shown_value, shown_values
+   use rodyn_schema, only: schema_extent, schema_row, any_list, group_index, one_value, type_text, type_word
    use rodyn_text, only: is_digit, to_text
    use rodyn_value_rules, only: broken_rule
    implicit none (type, external)
@@ -23,7 +24,7 @@ contains
       checked%extents = extents
       do g = 1, checked%document%n_groups
          do e = checked%document%groups(g)%first, checked%document%groups(g)%last
-            if (checked%ok(e)) call check_entry(checked, g, e)
+            if (checked%row(e) > 0 .and. .not. checked%document%entries(e)%faulty) call check_entry(checked, g, e)
          end do
          call check_repeated(checked, g)
       end do
@@ -36,17 +37,30 @@ contains
       end do
    end subroutine check_document
 
-   !> Index and count, then values.
+   !> Values, then index and count, which mean little where some are no values of the kind that the key takes.
    subroutine check_entry(checked, g, e)
       type(checked_document), intent(inout) :: checked
       integer, intent(in) :: g, e
       character(len=:), allocatable :: rule
       integer(i8) :: element
       integer :: v
+      logical :: sound !! so far: its key is not misspelt
 
       associate (document => checked%document, entry => checked%document%entries(e), &
                  row => checked%rows(checked%row(e)))
-         call check_count(checked, g, e)
+         if (takes_strings(row) .and. any(document%values(entry%first:entry%last)%kind /= is_string)) then
+            v = entry%first - 1 + findloc(document%values(entry%first:entry%last)%kind == is_string, .false., 1)
+            call broken_rule(document, row, document%values(v), rule)
+            call reject(checked, g, e, rule)
+            return
+         end if
+         if (.not. any(document%values(entry%first:entry%last)%kind == is_word)) then
+            sound = checked%ok(e)
+            checked%ok(e) = .true.
+            call check_count(checked, g, e)
+            if (.not. checked%ok(e) .and. row%extent == one_value) return
+            checked%ok(e) = checked%ok(e) .and. sound
+         end if
          element = 1
          do v = entry%first, entry%last
             call broken_rule(document, row, document%values(v), rule)
@@ -59,6 +73,11 @@ contains
          end do
       end associate
    end subroutine check_entry
+
+   pure logical function takes_strings(row)
+      type(schema_row), intent(in) :: row
+      takes_strings = row%type == type_word .or. row%type == type_text
+   end function takes_strings
 
    !> '(3)' for the value of that place in a list; the entry's own index if there is one value or an index.
    function element_text(checked, e, element) result(text)
@@ -116,7 +135,7 @@ contains
          if (extent <= 0 .and. entry%indexed) then
             call reject(checked, g, e, 'takes no index')
          else if (extent == one_value) then
-            if (given > 1) call reject(checked, g, e, 'takes one value'//not_count(given, checked%document, entry))
+            if (given > 1) call reject(checked, g, e, 'takes one value'//not_count(given, 1, checked%document, entry))
          else if (extent == any_list) then
             if (given > max_list) call reject(checked, g, e, 'takes at most '//to_text(max_list)//' values')
          else if (checked%extents(extent)%count > 0) then
@@ -144,43 +163,56 @@ contains
             end if
          end if
          if (given == 1 .or. given == wanted) return
-         if (wanted == 1) then
-            call reject(checked, g, e, 'takes one value'//not_count(given, checked%document, entry))
+         if (wanted == 1 .and. entry%indexed .and. given <= upper - entry%lower + 1) then
+            call reject(checked, g, e, 'takes one value'//not_count(given, wanted, checked%document, entry)//'; write '// &
+                        trim(entry%key)//'('//to_text(entry%lower)//':'//to_text(entry%lower + int(given) - 1)//') for all')
+         else if (wanted == 1) then
+            call reject(checked, g, e, 'takes one value'//not_count(given, wanted, checked%document, entry))
          else
             call reject(checked, g, e, 'takes 1 or '//to_text(wanted)//' values, one per '//trim(extent%name) &
-               //not_count(given, checked%document, entry))
+               //not_count(given, wanted, checked%document, entry))
          end if
       end associate
    end subroutine check_extent
 
-   !> ', not 2', and a hint if a decimal comma may be the reason
-   pure function not_count(n, document, entry) result(text)
+   !> ', not 2', and a hint at what may be the reason: decimal commas, a repeat count meant as a product
+   pure function not_count(n, wanted, document, entry) result(text)
       integer(i8), intent(in) :: n !! values given
+      integer, intent(in) :: wanted
       type(namelist_document), intent(in) :: document
       type(namelist_entry), intent(in) :: entry
       character(len=:), allocatable :: text
+
       text = ', not many'
       if (n <= huge(1)) text = ', not '//to_text(int(n))
-      text = text//comma_hint(document, entry)
+      if (n == 2 .or. n == 2*int(wanted, i8)) text = text//comma_hint(document, entry)
+      associate (first => document%values(entry%first))
+         if (wanted == 1 .and. entry%first == entry%last .and. first%copies > 1) text = text//'; '//to_text(first%copies)//'*'// &
+            shown_value(document, first)//' means '//to_text(first%copies)//' values of '//shown_value(document, first)
+      end associate
    end function not_count
 
-   !> '1,5' may be meant as 1.5: say so if two whole numbers stand with nothing but a comma between them.
+   !> '1,5' may be meant as 1.5: say so if all values are pairs of whole numbers with nothing but a comma between the two.
    pure function comma_hint(document, entry) result(hint)
       type(namelist_document), intent(in) :: document
       type(namelist_entry), intent(in) :: entry
       character(len=:), allocatable :: hint
-      integer :: first, v
+      character(len=:), allocatable :: whole, part
+      integer :: v
 
       hint = ''
-      do v = entry%first + 1, entry%last
-         first = document%values(v)%first
-         if (first < 3 .or. document%values(v - 1)%last /= first - 2) cycle
-         if (document%text(first - 1:first - 1) /= ',') cycle
-         if (.not. (is_digit(document%text(first - 2:first - 2)) .and. is_digit(document%text(first:first)))) cycle
-         hint = '; a decimal comma? write '//shown_value(document, document%values(v - 1))//'.' &
-            //shown_value(document, document%values(v))
-         return
+      if (modulo(entry%last - entry%first, 2) == 0) return
+      do v = entry%first, entry%last, 2
+         associate (a => document%values(v), b => document%values(v + 1))
+            if (.not. (any(a%kind == [is_integer, is_long_integer]) .and. any(b%kind == [is_integer, is_long_integer]))) return
+            if (b%first /= a%last + 2 .or. max(a%copies, b%copies) > 1) return
+            if (document%text(a%last + 1:a%last + 1) /= ',' .or. .not. is_digit(document%text(b%first:b%first))) return
+         end associate
       end do
+      whole = shown_value(document, document%values(entry%first))
+      part = shown_value(document, document%values(entry%first + 1))
+      hint = '; a decimal comma? write '//whole//'.'//part
+      if (len(part) == 3 .and. len(whole) < 4) hint = hint//' or '//whole//part
    end function comma_hint
 
    !> The same key, or the same element of it, twice in group `g`; elements left without a value.

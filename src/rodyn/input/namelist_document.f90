@@ -62,7 +62,9 @@ module rodyn_namelist_document
    type :: namelist_document
       character(len=:), allocatable :: name !! of the file, for messages
       character(len=:), allocatable :: text !! as read; values set later are appended
+      logical :: readable = .true.          !! false: the file is no text, which is its one fault
       integer :: n_lines = 0
+      integer :: last_end = 0               !! line in which a / ended a group last
       integer :: n_groups = 0, n_entries = 0, n_values = 0
       type(namelist_group), allocatable :: groups(:)
       type(namelist_entry), allocatable :: entries(:)

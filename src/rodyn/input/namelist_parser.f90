@@ -3,10 +3,12 @@
 !> One pass, linear in the length of the text, and no input can stop it: after a fault it goes on at the next
 !> value, key, group or line, so that one call finds all faults.
 module rodyn_namelist_parser
+   use rodyn_kinds, only: wp
    use rodyn_namelist_document, only: namelist_document, namelist_entry, namelist_value, add_group, add_entry, &
-      add_value, is_string, shown_value, index_text
+      add_value, is_integer, is_long_integer, is_real, is_string, shown_value, index_text
+   use rodyn_namelist_characters, only: make_plain, not_a_text
    use rodyn_namelist_value_text, only: classify
-   use rodyn_text, only: is_digit, is_name, lower, printable, to_text
+   use rodyn_text, only: formatted, is_digit, is_name, lower, printable, tidy, to_text
    use rodyn_utf8, only: first_bad_byte
    implicit none (type, external)
    private
@@ -27,7 +29,7 @@ module rodyn_namelist_parser
 
 contains
 
-   !> Parse the text of a whole file. Faults end up in `document%faults`.
+   !> Parse the text of a whole file. Faults end up in `document%faults`; of a file that is no text there is one.
    subroutine parse_document(text, name, document)
       character(len=*), intent(in) :: text
       character(len=*), intent(in) :: name !! of the file, for messages
@@ -36,12 +38,17 @@ contains
 
       document%name = name
       document%text = text
+      document%readable = len(not_a_text(text)) == 0
+      if (.not. document%readable) then
+         call document%faults%add(1, not_a_text(text))
+         return
+      end if
       call check_encoding(document)
-      if (index(text, char(239)//char(187)//char(191)) == 1) s%at = 4 ! byte order mark
+      call make_plain(document%text, document%faults)
       do
          call skip_blanks(document, s)
-         if (s%at > len(text)) exit
-         if (text(s%at:s%at) == '&') then
+         if (s%at > len(document%text)) exit
+         if (begins_group(document, s)) then
             call parse_group(document, s)
          else
             call skip_stray_text(document, s)
@@ -86,6 +93,26 @@ contains
       end do
    end subroutine skip_blanks
 
+   !> Does a group begin here? It should with &; some programs take $.
+   pure logical function begins_group(document, s)
+      type(namelist_document), intent(in) :: document
+      type(scanner), intent(in) :: s
+      begins_group = scan(next_character(document, s), '&$') == 1 .and. length_of_end(document, s) == 0
+   end function begins_group
+
+   !> Characters of a mark that ends groups in other programs, &end, $end or $; 0 if none stands here.
+   pure integer function length_of_end(document, s) result(length)
+      type(namelist_document), intent(in) :: document
+      type(scanner), intent(in) :: s
+
+      length = 0
+      if (scan(next_character(document, s), '&$') == 0) return
+      length = 1 + span(document%text(s%at + 1:), ends_token//'&$')
+      if (lower(document%text(s%at + 1:s%at + length - 1)) == 'end') return
+      if (length == 1 .and. document%text(s%at:s%at) == '$') return
+      length = 0
+   end function length_of_end
+
    !> Text outside of groups: one fault for the rest of the line, or up to the next group on it.
    subroutine skip_stray_text(document, s)
       type(namelist_document), intent(inout) :: document
@@ -93,10 +120,30 @@ contains
       integer :: first
 
       first = s%at
-      s%at = s%at + span(document%text(first:), lf//'&!')
+      s%at = s%at + 1 + span(document%text(first + 1:), lf//'&!')
       call document%faults%add(s%line, printable(trim(document%text(first:s%at - 1)), shown_max) &
-         //': text outside of a group')
+         //': text outside of a group'//end_hint(document, s%line)//comment_hint(document%text(first:s%at - 1)))
    end subroutine skip_stray_text
+
+   !> Where a group has just ended on the same line, its / may not have been meant so.
+   pure function end_hint(document, line) result(hint)
+      type(namelist_document), intent(in) :: document
+      integer, intent(in) :: line
+      character(len=:), allocatable :: hint
+
+      hint = ''
+      if (document%n_groups == 0 .or. line /= document%last_end) return
+      hint = '; the / before it ends &'//printable(trim(document%groups(document%n_groups)%name), shown_max)
+   end function end_hint
+
+   !> Marks of comments in other languages.
+   pure function comment_hint(text) result(hint)
+      character(len=*), intent(in) :: text
+      character(len=:), allocatable :: hint
+      hint = ''
+      if (scan(text(1:1), '#%;*') == 1 .or. text(:min(2, len(text))) == '//' .or. text(:min(2, len(text))) == '--') &
+         hint = '; a comment begins with !'
+   end function comment_hint
 
    !> Characters before the first one of `set`, or all.
    pure integer function span(text, set)
@@ -115,13 +162,24 @@ contains
       call add_group(document, document%text(s%at + 1:s%at + length), s%line)
       g = document%n_groups
       if (length == 0) call document%faults%add(s%line, '&: a group name must follow')
+      if (document%text(s%at:s%at) == '$') call document%faults%add(s%line, &
+         printable(document%text(s%at:s%at + length), shown_max)//': a group begins with &')
       s%at = s%at + length + 1
       do
          call skip_blanks(document, s)
          if (s%at > len(document%text)) exit
+         if (length_of_end(document, s) > 0) then
+            call end_by_word(document, s)
+            return
+         end if
          select case (document%text(s%at:s%at))
          case ('/')
             s%at = s%at + 1
+            if (next_character(document, s) == '/') then ! a comment, as other languages have it
+               call skip_words(document, s, s%at - 1, 'a comment begins with !')
+               cycle
+            end if
+            document%last_end = s%line
             return
          case ('&')
             exit
@@ -131,6 +189,16 @@ contains
       end do
       call complain_of_open_group(document, g, s)
    end subroutine parse_group
+
+   !> &end, $end or $ in place of the /.
+   subroutine end_by_word(document, s)
+      type(namelist_document), intent(inout) :: document
+      type(scanner), intent(inout) :: s
+      integer :: length
+      length = length_of_end(document, s)
+      call fault_in_group(document, s%line, document%text(s%at:s%at + length - 1), 'a group ends with /')
+      s%at = s%at + length
+   end subroutine end_by_word
 
    subroutine complain_of_open_group(document, g, s)
       type(namelist_document), intent(inout) :: document
@@ -163,11 +231,36 @@ contains
          if (document%text(s%at - 1:s%at - 1) == lf) s%at = s%at - 1
          call fault_in_group(document, s%line, document%text(first:s%at - 1), 'text without a key before it')
       else
-         s%at = first + max(1, span(document%text(first:), ends_token))
-         call fault_in_group(document, s%line, document%text(first:s%at - 1), 'expected a key and =')
-         if (next_character(document, s) == ',') s%at = s%at + 1
+         call skip_words(document, s, first, 'expected a key and ='// &
+                         comment_hint(document%text(first:min(len(document%text), first + 1))))
       end if
    end subroutine parse_assignment
+
+   !> Words without a key: one fault for all of them, up to the next assignment, the end of the group or that of the line.
+   subroutine skip_words(document, s, first, rule)
+      type(namelist_document), intent(inout) :: document
+      type(scanner), intent(inout) :: s
+      integer, intent(in) :: first !! where they begin
+      character(len=*), intent(in) :: rule
+      type(scanner) :: next
+      integer :: last
+
+      s%at = first + max(1, span(document%text(first:), ends_token))
+      if (document%text(first:s%at) == '//') s%at = s%at + 1
+      last = s%at - 1
+      do while (s%at <= len(document%text))
+         if (index(' ,'//tab, document%text(s%at:s%at)) > 0) then
+            s%at = s%at + 1
+            cycle
+         end if
+         if (scan(document%text(s%at:s%at), '/!&'//lf//cr) == 1 .or. length_of_end(document, s) > 0) exit
+         next = after_equals(document, s)
+         if (next%at > 0) exit
+         s%at = s%at + max(1, span(document%text(s%at:), ends_token))
+         last = s%at - 1
+      end do
+      call fault_in_group(document, s%line, document%text(first:last), rule)
+   end subroutine skip_words
 
    subroutine fault_in_group(document, line, text, rule)
       type(namelist_document), intent(inout) :: document
@@ -284,6 +377,7 @@ contains
       do
          call skip_blanks(document, s)
          if (s%at > len(document%text)) exit
+         if (length_of_end(document, s) > 0) exit
          select case (document%text(s%at:s%at))
          case ('/', '&')
             exit
@@ -294,6 +388,8 @@ contains
          case ('=')
             call complain(document, s%line, 'unexpected second =')
             s%at = s%at + 1
+         case ('#', '%') ! a comment, as other languages have it
+            call skip_words(document, s, s%at, 'a comment begins with !')
          case default
             next = after_equals(document, s)
             if (next%at > 0) exit
@@ -338,6 +434,11 @@ contains
          value%last = last
          s%at = last + 1
          call classify(document%text(value%first:value%last), value)
+         if (slash_within(document, s)) then
+            call complain_of_slash(document, s, value)
+            call add_value(document, value)
+            return
+         end if
       else if (scan(next_character(document, s), '"''') == 1) then
          call parse_string(document, s, value)
       else
@@ -348,6 +449,38 @@ contains
       if (index(blanks//',/!=', next_character(document, s)) == 0) call complain(document, s%line, &
          'a comma or a blank is missing between two values', shown_value(document, value))
    end subroutine parse_value
+
+   !> Does a word go on behind a '/', as in 3/2 or a/b.csv? The / that ends a group has a blank, a comment or a group behind it.
+   pure logical function slash_within(document, s)
+      type(namelist_document), intent(in) :: document
+      type(scanner), intent(in) :: s
+      slash_within = .false.
+      if (next_character(document, s) /= '/' .or. s%at >= len(document%text)) return
+      slash_within = index(blanks//'/!&$', document%text(s%at + 1:s%at + 1)) == 0
+   end function slash_within
+
+   subroutine complain_of_slash(document, s, value)
+      type(namelist_document), intent(inout) :: document
+      type(scanner), intent(inout) :: s
+      type(namelist_value), intent(inout) :: value
+      type(namelist_value) :: divisor
+      integer, parameter :: numbers(3) = [is_integer, is_long_integer, is_real]
+      integer :: last
+
+      last = s%at + span(document%text(s%at + 1:), ends_token)
+      call classify(document%text(s%at + 1:last), divisor)
+      s%at = last + 1
+      value%last = last
+      if (any(value%kind == numbers) .and. any(divisor%kind == numbers) .and. abs(divisor%x) > 0.0_wp) then
+         call complain(document, value%line, 'fractions are not computed: write '// &
+                       tidy(formatted(value%x/divisor%x, '(g0.15)')), document%text(value%first:last))
+      else if (any(divisor%kind == numbers)) then
+         call complain(document, value%line, 'a / ends the group; fractions are not computed', document%text(value%first:last))
+      else
+         call complain(document, value%line, 'a / ends the group; a text with one must be in quotes', &
+                       document%text(value%first:last))
+      end if
+   end subroutine complain_of_slash
 
    !> The character at the scanner; a blank at the end of the text.
    pure character(len=1) function next_character(document, s)
@@ -403,11 +536,40 @@ contains
       end do
       value%last = s%at - merge(2, 1, closed)
       if (.not. closed) then
+         call resume_in_line(document, s, value)
          call complain(document, value%line, 'the text does not end on its line: a quote is missing', &
             document%text(value%first - 1:value%last))
       else if (control) then
          call complain(document, value%line, 'control character in a text', shown_value(document, value))
       end if
    end subroutine parse_string
+
+   !> A text without its closing quote: go on where the line seems to, at the next key behind a comma or at a / at its end.
+   subroutine resume_in_line(document, s, value)
+      type(namelist_document), intent(in) :: document
+      type(scanner), intent(inout) :: s
+      type(namelist_value), intent(inout) :: value
+      type(scanner) :: key, next
+      integer :: at
+
+      key = s
+      do at = value%first, value%last
+         if (document%text(at:at) == ',') then
+            key%at = at + 1
+            key%line = value%line
+            call skip_white(document, key)
+            next = after_equals(document, key)
+            if (next%at == 0 .or. key%line > value%line) cycle
+            s%at = key%at
+            value%last = at - 1
+            return
+         end if
+      end do
+      at = verify(document%text(:value%last), blanks, back=.true.)
+      if (at < value%first) return
+      if (document%text(at:at) /= '/') return
+      s%at = at
+      value%last = at - 1
+   end subroutine resume_in_line
 
 end module rodyn_namelist_parser

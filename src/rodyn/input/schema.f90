@@ -9,7 +9,8 @@ module rodyn_schema
    public :: type_integer, type_real, type_logical, type_word, type_text
    public :: one_value, any_list
    public :: no_rule, positive, not_negative, at_least, in_range, between, up_to
-   public :: satisfies, rule_text, requirement, row_index, group_index, nearest_key, nearest_group
+   public :: satisfies, rule_text, requirement, row_index, group_index, nearest_key, nearest_group, misspelt_key, &
+      misspelt_group
 
    !> Types of a key. A word is one of a fixed list; a text is free.
    integer, parameter :: type_integer = 1, type_real = 2, type_logical = 3, type_word = 4, type_text = 5
@@ -194,5 +195,29 @@ contains
          nearest = trim(groups(i)%name)
       end do
    end function nearest_group
+
+   !> The nearest key of the group, if it is so near that it was meant; otherwise empty.
+   pure function misspelt_key(rows, group, key) result(meant)
+      type(schema_row), intent(in) :: rows(:)
+      character(len=*), intent(in) :: group, key
+      character(len=:), allocatable :: meant
+      meant = nearest_key(rows, group, key)
+      if (.not. is_near(trim(key), meant)) meant = ''
+   end function misspelt_key
+
+   !> The same for a group.
+   pure function misspelt_group(groups, name) result(meant)
+      type(schema_group), intent(in) :: groups(:)
+      character(len=*), intent(in) :: name
+      character(len=:), allocatable :: meant
+      meant = nearest_group(groups, name)
+      if (.not. is_near(trim(name), meant)) meant = ''
+   end function misspelt_group
+
+   !> About one letter wrong of every three; two that are exchanged count twice.
+   pure logical function is_near(a, b)
+      character(len=*), intent(in) :: a, b
+      is_near = len(a) > 1 .and. edit_distance(a, b) <= max(1, (min(len(a), len(b)) + 1)/3)
+   end function is_near
 
 end module rodyn_schema

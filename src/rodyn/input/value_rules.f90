@@ -1,7 +1,7 @@
 !> Does one value of a namelist keep the rules of its row?
 module rodyn_value_rules
    use rodyn_namelist_document, only: namelist_document, namelist_value, string_content, is_integer, &
-      is_long_integer, is_real, is_too_large, is_too_small, is_not_finite, is_logical, is_string
+      is_long_integer, is_real, is_too_large, is_too_small, is_not_finite, is_logical, is_string, is_word
    use rodyn_schema, only: schema_row, type_integer, type_logical, type_real, type_word, requirement, rule_text, &
       satisfies, up_to
    use rodyn_text, only: lower, word, word_count
@@ -21,6 +21,7 @@ contains
       select case (row%type)
       case (type_integer, type_real)
          call broken_number_rule(row, value, rule)
+         if (allocated(rule)) rule = rule//number_hint(document, value)
       case (type_logical)
          if (value%kind /= is_logical) rule = requirement(row)
       case (type_word)
@@ -68,6 +69,28 @@ contains
          rule = requirement(row)
       end select
    end subroutine broken_number_rule
+
+   !> What may have been meant by something that is no number.
+   pure function number_hint(document, value) result(hint)
+      type(namelist_document), intent(in) :: document
+      type(namelist_value), intent(in) :: value
+      character(len=:), allocatable :: hint
+      logical :: digits
+
+      hint = ''
+      if (value%kind == is_string) hint = '; without quotes'
+      if (value%kind /= is_word) return
+      associate (text => document%text(value%first:value%last))
+         digits = scan(text, '0123456789') > 0
+         if (scan(text, ';') > 0) then
+            hint = '; values are separated by commas or blanks'
+         else if (scan(text, '[](){}') > 0) then
+            hint = '; values stand without brackets, and expressions are not computed'
+         else if (index(lower(text), 'pi') > 0 .or. (digits .and. scan(text(2:), '*+-^') > 0)) then
+            hint = '; expressions are not computed'
+         end if
+      end associate
+   end function number_hint
 
    !> Which of the row's words a text is, case and trailing blanks aside; 0 if none.
    pure integer function matching_word(row, text) result(found)

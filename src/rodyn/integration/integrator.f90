@@ -15,6 +15,7 @@ module rodyn_integrator
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type, raise, exit_stopped
    use rodyn_ode, only: ode_system
+   use rodyn_text, only: formatted, tidy
    implicit none (type, external)
    private
    public :: integrator_type, solver_options, solver_statistics, monitor_type
@@ -296,34 +297,13 @@ contains
       real(wp), intent(in) :: t !! [s]
       character(len=:), allocatable :: text
 
-      character(len=32) :: digits
-      character(len=:), allocatable :: mantissa, exponent
-      integer :: i_exponent
-
       if (abs(t) >= 1.0e-3_wp .and. abs(t) < 1.0e6_wp) then
-         write (digits, '(f0.10)') t
+         text = tidy(formatted(t, '(f0.10)'))
       else if (abs(t) > 0.0_wp) then
-         write (digits, '(es16.9)') t
+         text = tidy(formatted(t, '(es16.9)'))
       else
-         digits = '0'
+         text = '0'
       end if
-      text = trim(adjustl(digits))
-      i_exponent = scan(text, 'E')
-      exponent = ''
-      mantissa = text
-      if (i_exponent > 0) then
-         exponent = text(i_exponent:)
-         mantissa = text(:i_exponent - 1)
-      end if
-      if (index(mantissa, '.') > 0) then
-         do while (mantissa(len(mantissa):) == '0')
-            mantissa = mantissa(:len(mantissa) - 1)
-         end do
-         if (mantissa(len(mantissa):) == '.') mantissa = mantissa(:len(mantissa) - 1)
-      end if
-      if (mantissa(1:1) == '.') mantissa = '0'//mantissa
-      if (index(mantissa, '-.') == 1) mantissa = '-0'//mantissa(2:)
-      text = mantissa//exponent
    end function time_text
 
 end module rodyn_integrator

@@ -3,7 +3,9 @@ module rodyn_command_line
    use rodyn_errors, only: error_type, raise, exit_done, exit_bad_input
    use rodyn_case_config, only: case_config
    use rodyn_case_reader, only: default_case, parse_case
+   use rodyn_case_notes, only: case_notes
    use rodyn_input_texts, only: input_texts, is_result_file, is_stream, read_input_texts
+   use rodyn_launcher, only: direct_launch, launch_type
    use rodyn_modal_analysis, only: analyse_modes
    use rodyn_posix_files, only: watch_signals
    use rodyn_run, only: check_steps, run_case
@@ -12,9 +14,10 @@ module rodyn_command_line
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_sweep_config, only: sweep_config
    use rodyn_sweep_engine, only: run_sweep, sweep_options
+   use rodyn_sweep_plan, only: new_plan, sweep_plan
    use rodyn_sweep_reader, only: default_sweep, parse_sweep
    use rodyn_terminal, only: print_error_line
-   use rodyn_text, only: as_utf8
+   use rodyn_text, only: as_utf8, to_text
    use rodyn_build_info, only: program_version, git_commit
    implicit none (type, external)
    private
@@ -38,15 +41,19 @@ module rodyn_command_line
 
 contains
 
-   !> Do what the arguments of the program say.
+   !> Do what the arguments of the program say. Of processes that were started together, the first speaks for all.
    subroutine run_command(exit_code)
       integer, intent(out) :: exit_code
       type(error_type), allocatable :: error
       type(options_type) :: options
+      type(launch_type) :: launch
       character(len=:), allocatable :: command
 
+      exit_code = exit_done
+      launch = direct_launch()
       command = ''
       if (command_argument_count() > 0) command = argument(1)
+      if (launch%rank > 0 .and. all(command /= [character(len=5) :: 'run', 'modes', 'sweep'])) return
       select case (command)
       case ('run', 'check', 'sweep', 'modes')
          call ignore_signal(sigpipe) ! what nobody reads does not end what is computed
@@ -54,7 +61,9 @@ contains
          if (.not. allocated(error)) call read_options(options, error)
          if (.not. allocated(error)) then
             if (options%help) then
-               call print_text(help_text(command), error)
+               if (launch%rank == 0) call print_text(help_text(command), error)
+            else if (launch%count > 1 .and. (command == 'run' .or. command == 'modes')) then
+               call refuse_company(command, launch, error)
             else if (command == 'run') then
                call run_file_command(options, error)
             else if (command == 'sweep') then
@@ -79,9 +88,20 @@ contains
       end select
       exit_code = exit_done
       if (.not. allocated(error)) return
-      call print_error_line(as_utf8(error%message))
+      if (launch%rank == 0) call print_error_line(as_utf8(error%message))
       exit_code = error%exit_code
    end subroutine run_command
+
+   !> Several processes would all compute the same.
+   subroutine refuse_company(command, launch, error)
+      character(len=*), intent(in) :: command
+      type(launch_type), intent(in) :: launch
+      type(error_type), allocatable, intent(out) :: error
+      call raise(error, 'rodyn '//command//': '//to_text(launch%count)//' processes were started together ('//launch%variable// &
+                 ' = '//to_text(launch%count)//'), and one computes a case; start it without mpirun or srun, '// &
+                 'or with one process. rodyn sweep shares many cases among processes; to give each process a case of its own, '// &
+                 'unset '//launch%variable, exit_bad_input)
+   end subroutine refuse_company
 
    !> Print what a command was asked for. That it could not be written is a failure.
    subroutine print_text(text, error)
@@ -168,6 +188,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(case_config) :: config
       type(sweep_config) :: sweep
+      type(sweep_plan) :: plan
       type(scene_type) :: scene
       type(input_texts) :: input
       character(len=:), allocatable :: name
@@ -177,16 +198,34 @@ contains
       name = input%name
       if (input%from_result) name = options%file
       if (input%is_sweep) then
-         call parse_sweep(input%text, input%name, input%base_text, input%base_name, .true., sweep, error)
+         call parse_sweep(input%text, input%name, input%base_text, input%base_name, .true., sweep, error, input%base_failure)
+         if (.not. allocated(error)) call new_plan(plan, sweep, error)
          if (.not. allocated(error)) call new_scene(scene, sweep%base_case, error)
       else ! numbers may be finite, and what follows from them not
          call parse_case(input%text, input%name, config, error)
          if (.not. allocated(error)) call new_scene(scene, config, error)
          if (.not. allocated(error)) call check_steps(config, scene, input%name, error)
       end if
-      if (.not. allocated(error) .and. .not. options%quiet) &
-         call print_text(name//': valid', error)
+      if (allocated(error) .or. options%quiet) return
+      name = name//': valid'
+      if (input%is_sweep) name = name//sweep%tried
+      if (.not. input%is_sweep) name = name//marked('note    ', case_notes(config, .true.))
+      call print_text(name, error)
    end subroutine check_command
+
+   !> Each line of a text on a new line and behind a mark.
+   pure function marked(mark, text) result(lines)
+      character(len=*), intent(in) :: mark, text
+      character(len=:), allocatable :: lines
+      integer :: i
+
+      lines = ''
+      if (len(text) > 0) lines = nl//mark
+      do i = 1, len(text)
+         lines = lines//text(i:i)
+         if (text(i:i) == nl) lines = lines//mark
+      end do
+   end function marked
 
    !> rodyn sweep
    subroutine sweep_command(options, exit_code, error)

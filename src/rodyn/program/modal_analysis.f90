@@ -2,6 +2,7 @@
 module rodyn_modal_analysis
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: case_config, load_config
+   use rodyn_case_notes, only: case_notes, joined_lines
    use rodyn_case_reader, only: resolved_case
    use rodyn_equilibrium, only: find_equilibrium
    use rodyn_errors, only: error_type
@@ -16,7 +17,7 @@ module rodyn_modal_analysis
    use rodyn_run_needs, only: check_memory, memory_of_scene, of_program
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_terminal, only: print_line
-   use rodyn_text, only: to_text
+   use rodyn_text, only: formatted, to_text
    implicit none (type, external)
    private
    public :: analyse_modes, modes_at_start
@@ -56,7 +57,7 @@ contains
       if (allocated(error)) return
       origin%title = config%title
       origin%resolved_input = resolved_case(config)
-      origin%notes = notes_on(motion%dynamics%scene, model%q(:scene%n_dof), .false.)
+      origin%notes = joined_lines(case_notes(config, .false.), notes_on(motion%dynamics%scene, model%q(:scene%n_dof), .false.))
       origin%sundials_version = sundials_version()
       if (present(input_text)) origin%input = input_text
       call write_modes(path, replace, origin, motion%dynamics%scene, model, modes, equilibrium, error)
@@ -106,10 +107,11 @@ contains
          if (modes%kind(i) == rigid_body .or. modes%kind(i) == mechanism) then
             write (line, '(i6, f19.6, f16.6, 35x, a)') i, 0.0_wp, 0.0_wp, modes%kind(i)
          else if (modes%kind(i) == relaxation) then
-            write (line, '(i6, 51x, es16.6, 3x, a)') i, decay(i), modes%kind(i)
+            write (line, '(i6, 51x, a16, 3x, a)') i, formatted(decay(i), '(es16.6)'), modes%kind(i)
          else
-            write (line, '(i6, f19.6, f16.6, 2es16.6, 3x, a)') i, frequency(i), frequency(i)/(2.0_wp*pi), ratio(i), &
-               decay(i), modes%kind(i)
+            write (line, '(i6, a19, 3a16, 3x, a)') i, formatted(frequency(i), '(f19.6)'), &
+               formatted(frequency(i)/(2.0_wp*pi), '(f16.6)'), formatted(ratio(i), '(es16.6)'), formatted(decay(i), '(es16.6)'), &
+               modes%kind(i)
          end if
          if (.not. modes%is_stable(i)) line = trim(line)//', growing'
          call print_line(trim(line))

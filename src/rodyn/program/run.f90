@@ -5,6 +5,7 @@ module rodyn_run
    use rodyn_text, only: formatted, to_text
    use rodyn_errors, only: error_type, raise, exit_stopped
    use rodyn_case_config, only: case_config
+   use rodyn_case_notes, only: case_notes, joined_lines
    use rodyn_case_reader, only: resolved_case
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_motion, only: motion_type, new_motion, initial_state, state_invariants
@@ -88,7 +89,7 @@ contains
                       progress)
       if (allocated(error) .and. present(name)) error%message = name//': '//error%message
       if (allocated(error)) return
-      header%notes = notes_on(scene, y(:scene%n_dof), config%output%ledger)
+      header%notes = joined_lines(case_notes(config, .true.), notes_on(scene, y(:scene%n_dof), config%output%ledger))
       if (.not. silent) then
          call print_line(describe_scene(scene, config%output%ledger))
          call print_line('method  '//driver%methods()//': '//driver%reason())

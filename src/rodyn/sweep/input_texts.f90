@@ -16,7 +16,8 @@ module rodyn_input_texts
       logical :: is_sweep = .false.
       logical :: from_result = .false.
       character(len=:), allocatable :: text, name           !! and what messages call it
-      character(len=:), allocatable :: base_text, base_name !! of a sweep
+      character(len=:), allocatable :: base_text, base_name !! of a sweep; empty where it names none
+      character(len=:), allocatable :: base_failure         !! why that cannot be read; empty if it can
    end type input_texts
 
 contains
@@ -27,6 +28,7 @@ contains
       type(input_texts), intent(out) :: input
       type(error_type), allocatable, intent(out) :: error
       character(len=:), allocatable :: directory
+      type(error_type), allocatable :: failure
 
       input%from_result = is_result_file(path)
       if (input%from_result) then
@@ -50,8 +52,12 @@ contains
       if (.not. input%is_sweep) return
       directory = '.'
       if (.not. is_stream(path)) directory = parent_directory(path)
-      call find_base(input%text, input%name, directory, input%base_name, error)
-      if (.not. allocated(error)) call read_text_file(input%base_name, input%base_text, error)
+      input%base_text = ''
+      input%base_failure = ''
+      call find_base(input%text, directory, input%base_name)
+      if (len(input%base_name) == 0) return
+      call read_text_file(input%base_name, input%base_text, failure)
+      if (allocated(failure)) input%base_failure = failure%message
    end subroutine read_input_texts
 
    !> Is the input a stream: standard input, a pipe, a device? It has no name that its result could have, too.
@@ -85,6 +91,7 @@ contains
 
       input%name = path//'@input'
       input%base_name = path//'@base_input'
+      input%base_failure = ''
       call file%open(path, failure)
       if (allocated(failure)) then
          call raise(error, path//': cannot be read as a result of Rodyn ('//failure%message//')')

@@ -22,7 +22,7 @@ module rodyn_sweep_case
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_switch_times, only: same_time
    use rodyn_simulation, only: observer_type, listed_times, simulate
-   use rodyn_sweep_config, only: sweep_config, is_ratio, value_text
+   use rodyn_sweep_config, only: sweep_axis, sweep_config, is_ratio, short_value_text
    use rodyn_sweep_plan, only: sweep_plan
    use rodyn_validity, only: validity_type, new_validity
    use rodyn_text, only: short_text
@@ -148,7 +148,7 @@ contains
       call build_values(sweep, plan%rows(case), config, error)
    end subroutine build_case
 
-   !> The configuration with the given row of each dimension.
+   !> The configuration with the given row of each dimension; 0: what the base has.
    subroutine build_values(sweep, rows, config, error)
       type(sweep_config), intent(in) :: sweep
       integer, intent(in) :: rows(:) !! (dimensions)
@@ -164,7 +164,7 @@ contains
       end if
       do a = 1, size(sweep%axes)
          associate (axis => sweep%axes(a), chain => config%chain)
-            if (is_ratio(axis)) chain%node_mass(:) = axis%numbers(rows(axis%dimension))* &
+            if (is_ratio(axis) .and. row_of(axis, rows) > 0) chain%node_mass(:) = axis%numbers(rows(axis%dimension))* &
                sum(chain%length*chain%mass_per_length*mean_mass_factors(chain%n_rods, config%profiles))/chain%n_rods
          end associate
       end do
@@ -182,8 +182,9 @@ contains
       document = sweep%base
       do a = 1, size(sweep%axes)
          associate (axis => sweep%axes(a))
-            if (is_ratio(axis)) cycle
-            call set_value(document, trim(axis%key), value_text(axis, rows(axis%dimension)), error, axis%in_list)
+            if (is_ratio(axis) .or. row_of(axis, rows) == 0) cycle
+            call set_value(document, trim(axis%key), short_value_text(axis, rows(axis%dimension)), error, &
+                           axis%in_list)
             if (allocated(error)) return
             if (axis%key /= 'model.inertia' .or. any(sweep%axes%key == 'model.bending')) cycle
             call follow_inertia(document, trim(sweep%base_case%model%bending), axis%texts(rows(axis%dimension)), error)
@@ -192,6 +193,14 @@ contains
       end do
       call case_from_document(document, config, error)
    end subroutine read_values
+
+   !> The row of an axis; 0: none.
+   pure integer function row_of(axis, rows)
+      type(sweep_axis), intent(in) :: axis
+      integer, intent(in) :: rows(:) !! (dimensions)
+      row_of = 0
+      if (axis%dimension > 0) row_of = rows(axis%dimension)
+   end function row_of
 
    !> Rods without inertia cannot swing by themselves: where an axis changes the inertia and none the bending,
    !> 'dynamic' becomes 'quasistatic' for lumped mass, and the reverse for distributed mass.

@@ -7,10 +7,10 @@ module rodyn_sweep_config
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: case_config
    use rodyn_namelist_document, only: namelist_document
-   use rodyn_text, only: quoted, to_text
+   use rodyn_text, only: formatted, quoted, tidy, to_text
    implicit none (type, external)
    private
-   public :: sweep_config, sweep_axis, key_length, axis_size, value_text, is_ratio
+   public :: sweep_config, sweep_axis, key_length, axis_size, shown_value, short_value_text, value_text, is_ratio
 
    integer, parameter :: key_length = 80
 
@@ -24,7 +24,8 @@ module rodyn_sweep_config
       real(wp), allocatable :: numbers(:)
       character(len=:), allocatable :: texts(:)
       character(len=12) :: unit = ''
-      integer :: dimension = 0
+      integer :: dimension = 0                        !! 0: not to be built, since the axis is at fault
+      logical, allocatable :: bad(:)                  !! values that break a rule of the key itself
    end type sweep_axis
 
    !> A whole sweep
@@ -42,6 +43,7 @@ module rodyn_sweep_config
       logical :: integrate = .true.                         !! otherwise nothing else is computed
       type(sweep_axis), allocatable :: axes(:)
       integer :: n_dimensions = 0
+      character(len=:), allocatable :: tried                !! what was tried of the values, in words
    end type sweep_config
 
 contains
@@ -61,6 +63,33 @@ contains
       type(sweep_axis), intent(in) :: axis
       is_ratio = axis%key == 'mass_ratio'
    end function is_ratio
+
+   !> Value `row` of an axis for a message.
+   function shown_value(axis, row) result(text)
+      type(sweep_axis), intent(in) :: axis
+      integer, intent(in) :: row
+      character(len=:), allocatable :: text
+      if (axis%textual .or. axis%whole) then
+         text = value_text(axis, row)
+      else
+         text = tidy(formatted(axis%numbers(row), '(g0.15)'))
+      end if
+   end function shown_value
+
+   !> Value `row` of an axis in namelist syntax, as short as it may be to read back the same.
+   function short_value_text(axis, row) result(text)
+      type(sweep_axis), intent(in) :: axis
+      integer, intent(in) :: row
+      character(len=:), allocatable :: text
+      real(wp) :: x
+      integer :: stat
+
+      text = shown_value(axis, row)
+      if (axis%textual .or. axis%whole) return
+      read (text, *, iostat=stat) x
+      if (stat /= 0) x = huge(x)
+      if (abs(x - axis%numbers(row)) > 0.0_wp) text = value_text(axis, row)
+   end function short_value_text
 
    !> Value `row` of an axis in namelist syntax.
    function value_text(axis, row) result(text)

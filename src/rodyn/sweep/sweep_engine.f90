@@ -119,14 +119,22 @@ contains
          call engine%progress%finish('incomplete', engine%counts)
       else if (engine%stopped) then
          call engine%progress%finish('stopped', engine%counts)
-         call raise(error, 'stopped by '//stop_signal()//': '//to_text(engine%counts%done + engine%counts%failed)//' of '// &
-                    to_text(engine%counts%total)//' cases are on the disk; run the same command again to resume', exit_stopped)
+         call raise(error, 'stopped by '//signal_of_stop()//': '//to_text(engine%counts%done + engine%counts%failed)//' of '// &
+                    to_text(engine%counts%total)//' cases are on the disk, in '//engine%directory%path// &
+                    '; run the same command again to resume', exit_stopped)
       else
          call conclude(engine, exit_code, error)
       end if
       if (allocated(error)) exit_code = error%exit_code
       call agree_on_end(engine, exit_code, error)
    end subroutine sweep_in_order
+
+   !> Which signal ended the sweep; it may have come to another rank.
+   function signal_of_stop() result(name)
+      character(len=:), allocatable :: name
+      name = stop_signal()
+      if (len(name) == 0) name = 'a signal to another rank'
+   end function signal_of_stop
 
    !> All ranks end with the exit code of the first.
    subroutine agree_on_end(engine, exit_code, error)
@@ -187,7 +195,8 @@ contains
 
       subroutine parse(try_values)
          logical, intent(in) :: try_values
-         call parse_sweep(input%text, input%name, input%base_text, input%base_name, try_values, engine%sweep, error)
+         call parse_sweep(input%text, input%name, input%base_text, input%base_name, try_values, engine%sweep, error, &
+                          input%base_failure)
       end subroutine parse
 
    end subroutine read_input
@@ -460,7 +469,8 @@ contains
             call engine%progress%finish('done', engine%counts)
             if (.not. engine%options%quiet) call print_line('done    shard '//to_text(engine%options%shard)// &
                ': '//to_text(engine%counts%done)//' done, '//to_text(engine%counts%failed)//' failed; '// &
-               to_text(n_finished)//' of '//to_text(engine%options%n_shards)//' shards are complete')
+               to_text(n_finished)//' of '//to_text(engine%options%n_shards)//' shards are complete, in '// &
+               engine%directory%path)
             call engine%directory%look_no_more()
             return
          end if

@@ -4,7 +4,7 @@
 !>     call parse_sweep(input%text, input%name, input%base_text, input%base_name, .true., sweep, error)
 !>     call new_plan(plan, sweep, error)
 module rodyn_sweep_reader
-   use rodyn_kinds, only: wp
+   use rodyn_kinds, only: i8, wp
    use rodyn_case_config, only: case_config, name_length
    use rodyn_case_reader, only: case_from_document
    use rodyn_case_schema, only: case_groups, case_rows
@@ -16,69 +16,82 @@ module rodyn_sweep_reader
    use rodyn_namelist_document, only: namelist_document, group_count
    use rodyn_namelist_edit, only: split_key
    use rodyn_namelist_parser, only: parse_document
-   use rodyn_schema, only: any_list, group_index, nearest_key, nearest_group, row_index, type_integer, type_logical, type_real
+   use rodyn_schema, only: schema_row, any_list, group_index, nearest_key, nearest_group, positive, row_index, rule_text, &
+      satisfies, type_integer, type_logical, type_real, type_word
    use rodyn_sweep_case, only: build_values
-   use rodyn_sweep_config, only: sweep_axis, sweep_config, axis_size, is_ratio, value_text
+   use rodyn_sweep_config, only: sweep_axis, sweep_config, axis_size, is_ratio, shown_value
    use rodyn_sweep_schema, only: sweep_extents, sweep_groups, sweep_rows
-   use rodyn_text, only: lower, printable, to_text
+   use rodyn_text, only: formatted, lower, printable, tidy, to_text
+   use rodyn_value_rules, only: matching_word
    implicit none (type, external)
    private
    public :: parse_sweep, find_base, is_sweep_text, default_sweep
 
    character(len=*), parameter :: nl = new_line('a')
+   integer, parameter :: most_tried = 10000 !! rows of a dimension that are built
+   integer, parameter :: most_told = 10     !! values of an axis that are named
+   type(schema_row), parameter :: ratio_row = schema_row('', 'mass_ratio', type_real, rule=positive)
    character(len=*), parameter :: heading = &
       '! A sweep of Rodyn: every key, with its default or an example.'//nl// &
       "! `base` is a case file; `rodyn defaults run` prints one."//nl
 
 contains
 
-   !> Where the base of a sweep is: its path, from the directory of the sweep file.
-   subroutine find_base(text, name, directory, path, error)
-      character(len=*), intent(in) :: text, name
+   !> Where the base of a sweep is: its path, from the directory of the sweep file; empty if the sweep names none.
+   subroutine find_base(text, directory, path)
+      character(len=*), intent(in) :: text
       character(len=*), intent(in) :: directory
       character(len=:), allocatable, intent(out) :: path
-      type(error_type), allocatable, intent(out) :: error
       type(namelist_document), target :: document
       type(checked_document), target :: checked
       type(field_loader) :: loader
 
       path = ''
-      call parse_document(text, name, document)
+      call parse_document(text, '', document)
       call match_document(document, sweep_groups, sweep_rows, checked)
       call check_document(checked, sweep_extents)
       loader%checked => checked
       call loader%open_group('sweep', 1)
       call loader%text_field('base', path)
-      if (entry_of(checked, 'sweep', 1, 'base') == 0) then
-         call checked%faults%to_error(name, error)
+      if (len_trim(path) == 0 .or. entry_of(checked, 'sweep', 1, 'base') == 0) then
+         path = ''
       else if (index(path, '/') /= 1 .and. directory /= '.') then
          path = directory//'/'//path
       end if
    end subroutine find_base
 
    !> Check and complete a sweep and its base.
-   subroutine parse_sweep(text, name, base_text, base_name, try_values, sweep, error)
+   subroutine parse_sweep(text, name, base_text, base_name, try_values, sweep, error, base_failure)
       character(len=*), intent(in) :: text, name
-      character(len=*), intent(in) :: base_text, base_name
+      character(len=*), intent(in) :: base_text, base_name !! empty name: there is none
       logical, intent(in) :: try_values !! build a case with each value of each axis
       type(sweep_config), intent(out) :: sweep
       type(error_type), allocatable, intent(out) :: error !! exit code 2, all faults
+      character(len=*), intent(in), optional :: base_failure !! why the base could not be read; empty: it could
       type(namelist_document), target :: document
       type(checked_document), target :: checked
       type(error_type), allocatable :: base_error
+      logical :: has_base
 
       sweep%name = name
       sweep%text = text
       sweep%base_name = base_name
       sweep%base_text = base_text
-      call parse_document(base_text, base_name, sweep%base)
-      call case_from_document(sweep%base, sweep%base_case, base_error)
+      sweep%tried = ''
+      has_base = len(base_name) > 0
+      if (present(base_failure)) has_base = has_base .and. len(base_failure) == 0
+      if (has_base) then
+         call parse_document(base_text, base_name, sweep%base)
+         call case_from_document(sweep%base, sweep%base_case, base_error)
+      end if
       call parse_document(text, name, document)
       call match_document(document, sweep_groups, sweep_rows, checked)
       call check_document(checked, sweep_extents)
-      call load_sweep(checked, sweep, .not. allocated(base_error))
-      if (try_values .and. checked%faults%count() == 0 .and. .not. allocated(base_error)) &
-         call try_axes(checked, sweep)
+      if (present(base_failure)) then
+         if (len(base_failure) > 0) call blame(checked, 'sweep', 1, 'base', base_failure)
+      end if
+      call load_sweep(checked, sweep, has_base, has_base .and. .not. allocated(base_error))
+      if (try_values .and. has_base .and. .not. allocated(base_error)) call try_axes(checked, sweep)
       call checked%faults%to_error(name, error)
       if (.not. allocated(base_error)) return
       if (allocated(error)) base_error%message = error%message//nl//base_error%message
@@ -100,14 +113,17 @@ contains
    end function default_sweep
 
    !> Fill the configuration, and note what is wrong with several keys together.
-   subroutine load_sweep(checked, sweep, base_is_sound)
+   subroutine load_sweep(checked, sweep, has_base, base_is_sound)
       type(checked_document), intent(inout), target :: checked
       type(sweep_config), intent(inout) :: sweep
-      logical, intent(in) :: base_is_sound
+      logical, intent(in) :: has_base, base_is_sound
       type(field_loader) :: loader
       character(len=name_length) :: combine, at
       character(len=:), allocatable :: path
-      integer :: i, n_axes
+      character(len=*), parameter :: axis_keys(8) = [character(len=11) :: 'key', 'values', 'text_values', 'start', 'stop', &
+                                                     'count', 'spacing', 'along']
+      logical, allocatable :: sound(:)
+      integer :: i, k, n_axes, n_faults
 
       loader%checked => checked
       combine = 'grid'
@@ -143,13 +159,16 @@ contains
       n_axes = instances(checked, 'axis')
       allocate (sweep%axes(n_axes))
       if (n_axes == 0) call checked%faults%add(checked%document%n_lines, '&axis: at least one is required')
+      allocate (sound(n_axes))
       do i = 1, n_axes
+         n_faults = checked%faults%count()
          call load_axis(checked, i, sweep%axes(i))
-         if (sweep%axes(i)%key /= '' .and. base_is_sound) call resolve_key(checked, i, sweep, sweep%axes(i))
+         sound(i) = checked%faults%count() == n_faults .and. &
+                    all([(is_sound(checked, 'axis', i, trim(axis_keys(k))), k=1, size(axis_keys))])
+         if (sweep%axes(i)%key /= '') call resolve_key(checked, i, sweep, has_base, sweep%axes(i), sound(i))
       end do
-      if (checked%faults%count() > 0) return
       call check_ratio(checked, sweep)
-      call set_dimensions(checked, sweep, combine)
+      call set_dimensions(checked, sweep, combine, sound)
    end subroutine load_sweep
 
    !> One &axis: key and values.
@@ -254,27 +273,28 @@ contains
       end do
    end function squeezed
 
-   !> Find the row of the case table that the key of an axis names, and what its values must be.
-   subroutine resolve_key(checked, i, sweep, axis)
+   !> Find the row of the case table that the key of an axis names, and hold every value against it.
+   subroutine resolve_key(checked, i, sweep, has_base, axis, sound)
       type(checked_document), intent(inout) :: checked
       integer, intent(in) :: i
       type(sweep_config), intent(in) :: sweep
+      logical, intent(in) :: has_base
       type(sweep_axis), intent(inout) :: axis
+      logical, intent(inout) :: sound !! false: the axis cannot be built from
       type(error_type), allocatable :: error
       character(len=:), allocatable :: group, name
-      integer :: instance, paren, r, k
+      integer :: instance, paren, r
       logical :: ok
 
       if (is_ratio(axis)) then
          axis%unit = '1'
-         if (axis%textual) call blame(checked, 'axis', i, 'text_values', 'mass_ratio is a number')
-         if (.not. allocated(axis%numbers)) return
-         if (any(axis%numbers <= 0.0_wp)) call blame(checked, 'axis', i, 'values', 'must be positive for mass_ratio')
+         if (axis%textual) call refuse('text_values', 'mass_ratio is a number')
+         if (sound) call check_values(checked, i, ratio_row, axis)
          return
       end if
       call split_key(trim(axis%key), group, instance, name, error)
       if (allocated(error)) then
-         call blame(checked, 'axis', i, 'key', 'a key is written group.name, or is mass_ratio')
+         call refuse('key', 'a key is written group.name, or is mass_ratio')
          return
       end if
       paren = index(name, '(')
@@ -282,40 +302,95 @@ contains
       r = row_index(case_rows, group, name)
       if (r == 0) then
          if (.not. any(case_rows%group == group)) then
-            call blame(checked, 'axis', i, 'key', 'a case has no group '//printable(group, 40)// &
-                       '; the nearest one is '//nearest_group(case_groups, group))
+            call refuse('key', 'a case has no group '//printable(group, 40)//'; the nearest one is '// &
+                        nearest_group(case_groups, group))
          else
-            call blame(checked, 'axis', i, 'key', '&'//group//' has no such key; the nearest one is ' &
-                       //nearest_key(case_rows, group, name))
+            call refuse('key', '&'//group//' has no such key; the nearest one is '//nearest_key(case_rows, group, name))
          end if
          return
       end if
       if (group == 'output' .or. (group == 'case' .and. name == 'title')) then
-         call blame(checked, 'axis', i, 'key', 'has no influence on a case of a sweep')
+         call refuse('key', 'has no influence on a case of a sweep')
          return
       end if
-      call check_instance(checked, i, group, instance, name, group_count(sweep%base, group), ok)
-      if (.not. ok) return
+      ok = .true.
+      if (has_base) call check_instance(checked, i, group, instance, name, group_count(sweep%base, group), ok)
+      sound = sound .and. ok
       axis%unit = case_rows(r)%unit
       axis%in_list = case_rows(r)%extent == any_list
       axis%whole = case_rows(r)%type == type_integer
       axis%bare = case_rows(r)%type == type_logical
       select case (case_rows(r)%type)
       case (type_integer, type_real)
-         if (axis%textual) call blame(checked, 'axis', i, 'text_values', trim(axis%key)//' takes numbers')
+         if (axis%textual) call refuse('text_values', trim(axis%key)//' takes numbers')
       case default
-         if (.not. axis%textual) call blame(checked, 'axis', i, 'key', 'takes text_values')
+         if (.not. axis%textual) call refuse('key', 'takes text_values')
       end select
-      if (.not. axis%whole .or. axis%textual .or. .not. allocated(axis%numbers)) return
-      if (entry_of(checked, 'axis', i, 'values') == 0) axis%numbers = anint(axis%numbers)
-      do k = 1, size(axis%numbers)
-         if (abs(axis%numbers(k)) <= huge(1)) then
-            if (abs(axis%numbers(k) - anint(axis%numbers(k))) <= 0.0_wp) cycle
-         end if
-         call blame(checked, 'axis', i, 'values', 'value '//to_text(k)//' must be a whole number')
-         return
-      end do
+      if (.not. sound) return
+      if (axis%whole .and. entry_of(checked, 'axis', i, 'values') == 0) axis%numbers = anint(axis%numbers)
+      call check_values(checked, i, case_rows(r), axis)
+
+   contains
+
+      subroutine refuse(key, rule)
+         character(len=*), intent(in) :: key, rule
+         call blame(checked, 'axis', i, key, rule)
+         sound = .false.
+      end subroutine refuse
+
    end subroutine resolve_key
+
+   !> Note every value that breaks the rule of its key, as far as they are few.
+   subroutine check_values(checked, i, row, axis)
+      type(checked_document), intent(inout) :: checked
+      integer, intent(in) :: i !! axis
+      type(schema_row), intent(in) :: row
+      type(sweep_axis), intent(inout) :: axis
+      character(len=:), allocatable :: key, rule
+      integer :: k, n_bad
+
+      key = 'values'
+      if (axis%textual) key = 'text_values'
+      if (entry_of(checked, 'axis', i, key) == 0) key = 'key'
+      n_bad = 0
+      allocate (axis%bad(axis_size(axis)), source=.false.)
+      do k = 1, size(axis%bad)
+         rule = ''
+         if (axis%textual) then
+            if (row%type == type_word) then
+               if (matching_word(row, trim(axis%texts(k))) == 0) rule = rule_text(row)
+            end if
+         else if (row%type == type_integer .and. .not. is_whole(axis%numbers(k))) then
+            rule = 'must be a whole number'
+         else if (.not. satisfies(row, axis%numbers(k))) then
+            rule = rule_text(row)
+         end if
+         if (len(rule) == 0) cycle
+         axis%bad(k) = .true.
+         n_bad = n_bad + 1
+         if (n_bad <= most_told) call blame(checked, 'axis', i, key, 'value '//to_text(k)//' ('//told(k)//') '//rule)
+      end do
+      if (n_bad > most_told) call blame(checked, 'axis', i, key, 'and '//to_text(n_bad - most_told)//' more of its values')
+
+   contains
+
+      function told(k) result(text)
+         integer, intent(in) :: k
+         character(len=:), allocatable :: text
+         if (axis%whole) then
+            text = tidy(formatted(axis%numbers(k), '(g0.15)')) ! which may be none
+         else
+            text = shown_value(axis, k)
+         end if
+      end function told
+
+   end subroutine check_values
+
+   pure logical function is_whole(x)
+      real(wp), intent(in) :: x
+      is_whole = abs(x) <= huge(1)
+      if (is_whole) is_whole = abs(x - anint(x)) <= 0.0_wp
+   end function is_whole
 
    !> Is it clear which group of the base is meant? Those that may stand several times count from 1, in the order of the file.
    subroutine check_instance(checked, i, group, instance, name, n, ok)
@@ -375,11 +450,12 @@ contains
       end do
    end subroutine check_ratio
 
-   !> Which axes advance together.
-   subroutine set_dimensions(checked, sweep, combine)
+   !> Which axes advance together. Those at fault have no dimension; without them the others can still be tried.
+   subroutine set_dimensions(checked, sweep, combine, sound)
       type(checked_document), intent(inout), target :: checked
       type(sweep_config), intent(inout) :: sweep
       character(len=*), intent(in) :: combine
+      logical, intent(in) :: sound(:) !! (axes)
       type(field_loader) :: loader
       character(len=:), allocatable :: along
       integer :: i, k, partner
@@ -397,47 +473,193 @@ contains
                if (sweep%axes(k)%key == squeezed(along)) partner = k
             end do
             if (partner == 0) call blame(checked, 'axis', i, 'along', 'no axis above has this key')
-         else if (combine == 'zip' .and. i > 1) then
-            partner = 1
+         else if (combine == 'zip') then
+            partner = findloc(sweep%axes(:i - 1)%dimension > 0, .true., 1)
+         end if
+         if (.not. sound(i)) cycle
+         if (partner > 0) then
+            if (sweep%axes(partner)%dimension == 0) partner = 0
          end if
          if (partner == 0) then
             sweep%n_dimensions = sweep%n_dimensions + 1
             sweep%axes(i)%dimension = sweep%n_dimensions
             cycle
          end if
-         sweep%axes(i)%dimension = sweep%axes(partner)%dimension
-         if (axis_size(sweep%axes(i)) /= axis_size(sweep%axes(partner))) call blame(checked, 'axis', i, 'key', &
-            'has '//to_text(axis_size(sweep%axes(i)))//' values, but '//trim(sweep%axes(partner)%key)// &
-            ', with which it advances, has '//to_text(axis_size(sweep%axes(partner))))
+         if (axis_size(sweep%axes(i)) == axis_size(sweep%axes(partner))) then
+            sweep%axes(i)%dimension = sweep%axes(partner)%dimension
+         else
+            call blame(checked, 'axis', i, 'key', &
+               'has '//to_text(axis_size(sweep%axes(i)))//' values, but '//trim(sweep%axes(partner)%key)// &
+               ', with which it advances, has '//to_text(axis_size(sweep%axes(partner))))
+         end if
       end do
    end subroutine set_dimensions
 
-   !> Build a case with each row of each dimension, the others in their first: a value that the case refuses is told
-   !> before anything is computed. What only a combination forbids fails as a case.
+   !> Build a case with each row of each dimension, the others in rows that are accepted: a value that the case refuses is told
+   !> before anything is computed, at its own axis. What only a combination forbids fails as a case.
    subroutine try_axes(checked, sweep)
       type(checked_document), intent(inout) :: checked
-      type(sweep_config), intent(in) :: sweep
-      type(case_config) :: config
-      type(error_type), allocatable :: error
-      integer :: at(sweep%n_dimensions)
-      integer, parameter :: most_tried = 10000
-      integer :: a, d, n, row
+      type(sweep_config), intent(inout) :: sweep
+      integer :: reference(sweep%n_dimensions), at(sweep%n_dimensions)
+      integer :: d, i, n, n_refused, n_tried, n_values, row
+      logical :: conflict !! one of values that are fine by themselves was told
+      character(len=:), allocatable :: why
 
+      call find_reference(sweep, reference)
+      n_tried = 0
+      n_values = 0
+      conflict = .false.
       do d = 1, sweep%n_dimensions
-         do a = 1, size(sweep%axes)
-            if (sweep%axes(a)%dimension == d) exit
-         end do
-         n = axis_size(sweep%axes(a))
-         do row = 1, n, 1 + n/most_tried
-            at = 1
+         n = dimension_size(sweep, d)
+         n_refused = 0
+         n_values = n_values + n
+         do i = 1, min(n, most_tried)
+            row = tried_row(i, n, most_tried)
+            if (is_bad(sweep, d, row)) cycle
+            n_tried = n_tried + 1
+            at = reference
             at(d) = row
-            call build_values(sweep, at, config, error)
-            if (.not. allocated(error)) cycle
-            call blame(checked, 'axis', a, 'key', 'value '//to_text(row)//' ('//value_text(sweep%axes(a), row)// &
-                       ') makes a case that is refused: '//error%message)
+            call judge(sweep, d, at, conflict, why)
+            if (len(why) == 0) cycle
+            n_refused = n_refused + 1
+            call blame(checked, 'axis', culprit(sweep, d, row), 'key', 'value '//to_text(row)//' ('// &
+                       shown_value(sweep%axes(culprit(sweep, d, row)), row)//') '//why)
+            if (n_refused < most_told .or. i == min(n, most_tried)) cycle
+            call blame(checked, 'axis', culprit(sweep, d, row), 'key', 'further values were not tried')
             exit
          end do
       end do
+      sweep%tried = '; each of '//to_text(n_values)//' values tried'
+      if (n_tried < n_values) sweep%tried = '; '//to_text(n_tried)//' of '//to_text(n_values)// &
+                                            ' values tried, the others held against the rules of their keys alone'
+      if (sweep%n_dimensions > 1) sweep%tried = sweep%tried//'; a combination that is refused fails as a case'
    end subroutine try_axes
+
+   !> Is a row refused, and why? Empty if it is not, or not with all of the others.
+   subroutine judge(sweep, d, at, conflict, why)
+      type(sweep_config), intent(in) :: sweep
+      integer, intent(in) :: d             !! dimension
+      integer, intent(in) :: at(:)         !! its row, and accepted ones of the others
+      logical, intent(inout) :: conflict   !! one was told, which the other axes need not repeat
+      character(len=:), allocatable, intent(out) :: why
+      type(case_config) :: config
+      type(error_type), allocatable :: error, alone_error
+      integer :: alone(size(at))
+
+      why = ''
+      call build_values(sweep, at, config, error)
+      if (.not. allocated(error)) return
+      if (works_elsewhere(sweep, d, at)) return
+      alone = 0
+      alone(d) = at(d)
+      call build_values(sweep, alone, config, alone_error)
+      if (allocated(alone_error)) then
+         why = 'makes a case that is refused: '//alone_error%message
+      else if (.not. conflict) then
+         conflict = .true.
+         why = 'is refused together with the other axes: '//error%message
+      end if
+   end subroutine judge
+
+   !> Does the row of one dimension make a valid case with some other row of another one?
+   logical function works_elsewhere(sweep, d, at) result(works)
+      type(sweep_config), intent(in) :: sweep
+      integer, intent(in) :: d, at(:)
+      type(case_config) :: config
+      type(error_type), allocatable :: error
+      integer, parameter :: most = 100 !! rows of each
+      integer :: e, i, n
+      integer :: other(size(at))
+
+      works = .true.
+      do e = 1, sweep%n_dimensions
+         if (e == d) cycle
+         n = dimension_size(sweep, e)
+         do i = 1, min(n, most)
+            other = at
+            other(e) = tried_row(i, n, most)
+            if (is_bad(sweep, e, other(e))) cycle
+            call build_values(sweep, other, config, error)
+            if (.not. allocated(error)) return
+         end do
+      end do
+      works = .false.
+   end function works_elsewhere
+
+   !> Rows in which the others stand while one dimension is tried: the first ones if they make a valid case, otherwise the first of
+   !> each that is accepted with the base; 0, the base's own values, where none is.
+   subroutine find_reference(sweep, reference)
+      type(sweep_config), intent(in) :: sweep
+      integer, intent(out) :: reference(:)
+      type(case_config) :: config
+      type(error_type), allocatable :: error
+      integer :: alone(size(reference))
+      integer :: d, i, n
+
+      reference = 1
+      if (.not. any([(is_bad(sweep, d, 1), d=1, size(reference))])) then
+         call build_values(sweep, reference, config, error)
+         if (.not. allocated(error)) return
+      end if
+      reference = 0
+      do d = 1, size(reference)
+         n = dimension_size(sweep, d)
+         do i = 1, min(n, most_tried)
+            alone = 0
+            alone(d) = tried_row(i, n, most_tried)
+            if (is_bad(sweep, d, alone(d))) cycle
+            call build_values(sweep, alone, config, error)
+            if (allocated(error)) cycle
+            reference(d) = alone(d)
+            exit
+         end do
+      end do
+   end subroutine find_reference
+
+   !> Row number i of those that are tried: all, or `most` of them from the first to the last.
+   pure integer function tried_row(i, n, most)
+      integer, intent(in) :: i, n, most
+      tried_row = i
+      if (n > most) tried_row = 1 + int(int(i - 1, i8)*(n - 1)/(most - 1))
+   end function tried_row
+
+   !> Rows of a dimension.
+   pure integer function dimension_size(sweep, d)
+      type(sweep_config), intent(in) :: sweep
+      integer, intent(in) :: d
+      dimension_size = axis_size(sweep%axes(findloc(sweep%axes%dimension, d, 1)))
+   end function dimension_size
+
+   !> Does a value of the row break the rule of its own key, which has been told?
+   pure logical function is_bad(sweep, d, row)
+      type(sweep_config), intent(in) :: sweep
+      integer, intent(in) :: d, row
+      integer :: a
+      is_bad = .false.
+      do a = 1, size(sweep%axes)
+         if (sweep%axes(a)%dimension == d) is_bad = is_bad .or. sweep%axes(a)%bad(row)
+      end do
+   end function is_bad
+
+   !> Which axis of a dimension is at fault: the first that the base refuses alone, or the first one.
+   integer function culprit(sweep, d, row)
+      type(sweep_config), intent(in) :: sweep
+      integer, intent(in) :: d, row
+      type(sweep_config) :: single
+      type(case_config) :: config
+      type(error_type), allocatable :: error
+
+      if (count(sweep%axes%dimension == d) > 1) then
+         do culprit = 1, size(sweep%axes)
+            if (sweep%axes(culprit)%dimension /= d) cycle
+            single = sweep
+            single%axes%dimension = 0
+            single%axes(culprit)%dimension = 1
+            call build_values(single, [row], config, error)
+            if (allocated(error)) return
+         end do
+      end if
+      culprit = findloc(sweep%axes%dimension, d, 1)
+   end function culprit
 
 end module rodyn_sweep_reader
