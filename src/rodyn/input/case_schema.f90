@@ -135,7 +135,7 @@ module rodyn_case_schema
          when="required when law = 'table'", help='increasing times, two at least'), &
       schema_row('load', 'values', type_real, any_list, 'N or N m', 'depends', &
          when="required when law = 'table'", help='value at each of the times, linear in between'), &
-      schema_row('load', 'after', type_word, default='depends', words='zero|hold', example="'zero'", &
+      schema_row('load', 'after', type_word, default='depends', words='zero|hold', &
          when="law = 'table'; default: 'zero'", &
          help='the load beyond its last time, until t_end; before its first time it is zero'), &
       schema_row('kink_program', 'hinge', type_integer, rule=not_negative, example='0', &
