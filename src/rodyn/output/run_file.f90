@@ -6,9 +6,9 @@
 !>     call run%finish('done', report, error)
 !>
 !> Until `finish`, the file has a temporary name (`rodyn_result_file`) under which it may be read: rows are in it a block at
-!> a time, and after `flush_seconds` at the latest, in long runs a tenth of their time so far. Where they find no room, `append`
-!> fails, and `finish` ends the file as a failed one with the rows that did. After a failure within HDF5 the file is left as
-!> it is, and every later call tells of that failure again, so that the caller may end its work in the usual way.
+!> a time, and where that takes long after a minute at the latest. Where they find no room, `append` fails, and `finish` ends
+!> the file as a failed one with the rows that did. After a failure within HDF5 the file is left as it is, and every later
+!> call tells of that failure again, so that the caller may end its work in the usual way.
 module rodyn_run_file
    use rodyn_build_info, only: git_commit
    use rodyn_errors, only: error_type, raise
@@ -30,7 +30,10 @@ module rodyn_run_file
    integer, parameter :: block_bytes = 2*1024*1024 !! memory for rows that wait to be written
    integer, parameter :: most_block_rows = 4096
    integer, parameter :: bytes_per_real = 8
-   real(wp), parameter :: flush_seconds = 2.0_wp, flush_share = 0.1_wp !! of wall time [s], of that since the start
+
+   ! How long rows wait to be written when a block is slow to fill: as long as the run has taken until the last writing, within
+   ! these bounds. A reader needs some time in which nothing is written, and a writing costs as much as one of a block.
+   real(wp), parameter :: shortest_wait = 1.0_wp, longest_wait = 60.0_wp !! wall time [s]
 
    ! Room that HDF5 takes beside the numbers [bytes]
    integer(i8), parameter :: bytes_of_layout = 3000_i8 !! of one data set, empty
@@ -321,7 +324,9 @@ contains
       class(run_file), intent(in) :: self
       integer(i8) :: now, rate
       call system_clock(now, rate)
-      flush_is_due = now - self%clock_written > max(flush_seconds*rate, flush_share*real(now - self%clock_start, wp))
+      associate (so_far => real(self%clock_written - self%clock_start, wp), waited => real(now - self%clock_written, wp))
+         flush_is_due = waited > max(shortest_wait*rate, min(longest_wait*rate, so_far))
+      end associate
    end function flush_is_due
 
    !> The group `events` of a run that may have some, before `finish`. Without events its data sets are empty.
