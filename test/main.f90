@@ -14,6 +14,7 @@ program tester
    use test_integrators, only: collect_integrators
    use test_kernels, only: collect_kernels
    use test_lanes, only: collect_lanes
+   use test_ledger, only: collect_ledger
    use test_locks, only: collect_locks
    use test_driver, only: collect_driver
    use test_method_choice, only: collect_method_choice
@@ -82,6 +83,7 @@ program tester
    call run('run_file', collect_run_file)
    call run('article', collect_article)
    call run('invariants', collect_invariants)
+   call run('ledger', collect_ledger)
    call run('beams', collect_beams)
 
    write (*, '(i0, " passed, ", i0, " failed")') tally%passed, tally%failed

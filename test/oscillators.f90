@@ -44,7 +44,7 @@ contains
       ok = t < self%t_refuse
       ydot(1) = y(2)
       ydot(2) = -self%frequency**2*y(1) - self%damping*y(2) + self%force
-      if (self%n_states > 2) ydot(3) = y(2)**2
+      if (size(ydot) > 2) ydot(3) = y(2)**2
       if (t >= self%t_nan) ydot(1) = ieee_value(1.0_wp, ieee_quiet_nan)
    end subroutine rhs
 
@@ -59,7 +59,6 @@ contains
       jac(1, 2) = 1.0_wp
       jac(2, 1) = -self%frequency**2
       jac(2, 2) = -self%damping
-      if (self%n_states > 2) jac(3, 2) = 2.0_wp*y(2)
    end subroutine jacobian
 
 end module test_oscillators

@@ -17,7 +17,6 @@ module smooth_problems
       procedure :: has_lanes
       procedure :: lane_accelerations
       procedure :: find_modes
-      procedure :: quadratures
    end type smooth_problem
 
    abstract interface
@@ -212,14 +211,5 @@ contains
       call modes%reserve(0, self%n_dof, 0, 0)
       ok = .true.
    end subroutine find_modes
-
-   subroutine quadratures(self, t, q, p, rate)
-      class(smooth_problem), intent(inout) :: self
-      real(wp), intent(in) :: t
-      real(wp), contiguous, intent(in) :: q(:), p(:)
-      real(wp), intent(out) :: rate(:)
-      associate (unused => self, unused_t => t, unused_q => q, unused_p => p); end associate
-      rate = 0.0_wp
-   end subroutine quadratures
 
 end module smooth_problems

@@ -7,8 +7,7 @@ module rodyn_kinematics
    use rodyn_three_moments, only: slopes_from_moments
    implicit none (type, external)
    private
-   public :: invariants_type, invariants, load_power, damper_power, dissipated_power, slopes, kinetic_energy, &
-      elastic_energy
+   public :: invariants_type, invariants, load_power, damper_power, slopes, kinetic_energy, elastic_energy
 
    !> What the ledger records of a state. Momenta along inertial axes, angular momentum about their origin.
    type :: invariants_type
@@ -185,23 +184,7 @@ contains
       end associate
    end subroutine slopes
 
-   !> Power that dampers and sliding friction take, sum D th'^2 + f th' [W].
-   pure real(wp) function dissipated_power(scene, q, p)
-      type(scene_type), intent(in) :: scene
-      real(wp), intent(in) :: q(:), p(:)
-      real(wp), dimension(0:scene%n - 1) :: theta, theta_rate
-      real(wp), dimension(0:scene%n) :: moment, moment_rate
-
-      dissipated_power = 0.0_wp
-      if (.not. (scene%hinges%has_damping .or. scene%hinges%has_friction)) return
-      associate (first => scene%n_base + 1)
-         call hinge_state(scene%hinges, scene%n, scene%dynamic_bending, q(first:), p(first:), theta, theta_rate, &
-                          moment, moment_rate)
-      end associate
-      dissipated_power = sum((scene%hinges%damping*theta_rate + scene%hinges%friction)*theta_rate)
-   end function dissipated_power
-
-   !> The same with memory of the caller's, for the right-hand side of scenes without relaxing hinges.
+   !> Power that dampers and sliding friction take, sum D th'^2 + f th' [W], in scenes without relaxing hinges.
    pure subroutine damper_power(scene, p, rate, power)
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: p(:)

@@ -1,8 +1,8 @@
 !> The motion of a scene as first-order equations: y = (q, p [, work of the loads, dissipated energy]). Behind the
 !> coordinates of the article (and the bubbles), q ends with the rotations of relaxing hinges, if there are any (`rodyn_hinge_law`).
 !>
-!> The two integrals are there only with a ledger. They take no part in step-size control, so that a run with a
-!> ledger makes the same steps as one without.
+!> The two integrals are there only with a ledger. Their error is controlled apart (`rodyn_ode`), so that a run with a ledger
+!> makes the same steps as one without.
 module rodyn_motion
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
@@ -21,12 +21,12 @@ module rodyn_motion
    use rodyn_linearisation, only: balance_tangent
    use rodyn_newton, only: newton_type
    use rodyn_locks, only: has_slaves, reduce, expand, reduce_matrix
-   use rodyn_kinematics, only: load_power, damper_power, dissipated_power, invariants_type, invariants
-   use rodyn_hinge_law, only: hinge_moments, relaxation_rates, relaxation_tangent, initial_joints, hinge_tangent
+   use rodyn_kinematics, only: load_power, damper_power, invariants_type, invariants
+   use rodyn_hinge_law, only: hinge_moments, hinge_state, relaxation_rates, relaxation_tangent, initial_joints, hinge_tangent
    use rodyn_lapack, only: dpotrf, dpotrs
    implicit none (type, external)
    private
-   public :: motion_type, new_motion, initial_state, state_invariants, differentiate_balance, balance_derivatives
+   public :: motion_type, new_motion, initial_state, state_invariants, differentiate_balance, balance_derivatives, hinges_at
 
    !> A running scene.
    type, extends(mechanical_system) :: motion_type
@@ -124,7 +124,7 @@ contains
             ydot(2) = ydot(2) - y(r + 3)*y(1)
          end if
          if (r > m) call relaxation_rates(self%dynamics%scene%hinges, self%dynamics%work%moment, y(m + 1:r), ydot(m + 1:r))
-         if (self%ledger) call powers(self, y(1:r), y(r + 1:r + m), ydot(m + 1:r), ydot(r + m + 1:))
+         if (size(ydot) > r + m) call powers(self, y(1:r), y(r + 1:r + m), ydot(m + 1:r), ydot(r + m + 1:))
       end associate
    end subroutine rhs
 
@@ -158,16 +158,48 @@ contains
       real(wp), contiguous, intent(in) :: q(:), p(:)
       integer :: k
 
-      associate (scene => self%dynamics%scene, work => self%dynamics%work, first => self%dynamics%scene%n_base + 1)
-         if (has_slaves(scene)) work%theta(0:) = work%moment(:scene%n - 1) ! the kernel has found those of locked hinges
-         call hinge_moments(scene%hinges, scene%n, scene%dynamic_bending, q(first:), p(first:), work%theta, work%moment)
-         drive_power = 0.0_wp
-         do k = 0, scene%n - 1
-            if (has_slaves(scene) .and. scene%hinges%locked(k)) work%moment(k) = work%theta(k)
-            drive_power = drive_power - work%moment(k)*scene%hinges%kink_rate(k)
-         end do
-      end associate
+      call complete_moments(self, q, p)
+      drive_power = 0.0_wp
+      do k = 0, self%dynamics%scene%n - 1
+         drive_power = drive_power - self%dynamics%work%moment(k)*self%dynamics%scene%hinges%kink_rate(k)
+      end do
    end function drive_power
+
+   !> Moments in all hinges into the workspace, where the kernel has left those of locked ones.
+   subroutine complete_moments(self, q, p)
+      class(motion_type), intent(inout) :: self
+      real(wp), contiguous, intent(in) :: q(:), p(:)
+
+      associate (scene => self%dynamics%scene, work => self%dynamics%work, first => self%dynamics%scene%n_base + 1)
+         if (has_slaves(scene)) work%theta(0:) = work%moment(:scene%n - 1)
+         call hinge_moments(scene%hinges, scene%n, scene%dynamic_bending, q(first:), p(first:), work%theta, work%moment)
+         if (has_slaves(scene)) work%moment(:scene%n - 1) = merge(work%theta(0:), work%moment(:scene%n - 1), scene%hinges%locked)
+      end associate
+   end subroutine complete_moments
+
+   !> Rotations of all hinges and moments in them, at a state.
+   subroutine hinges_at(self, t, y, angle, moment, ok)
+      class(motion_type), intent(inout) :: self
+      real(wp), intent(in) :: t                        !! [s]
+      real(wp), contiguous, intent(in) :: y(:)         !! (q, p, ...)
+      real(wp), allocatable, intent(out) :: angle(:)   !! (n), hinges 0..n-1 [rad]
+      real(wp), allocatable, intent(out) :: moment(:)  !! (n) [N m]
+      logical, intent(out) :: ok
+      real(wp) :: acceleration(self%n_dof)
+      real(wp), dimension(0:self%dynamics%scene%n - 1) :: theta, rate
+      real(wp), dimension(0:self%dynamics%scene%n) :: at_rest, moment_rate
+
+      associate (r => self%n_q, m => self%n_dof, scene => self%dynamics%scene)
+         call self%dynamics%accelerations(t, y(1:r), y(r + 1:r + m), acceleration, ok)
+         call complete_moments(self, y(1:r), y(r + 1:r + m))
+         moment = self%dynamics%work%moment(:scene%n - 1)
+         associate (first => scene%n_base + 1)
+            call hinge_state(scene%hinges, scene%n, scene%dynamic_bending, y(first:r), y(r + first:r + m), theta, rate, at_rest, &
+                             moment_rate)
+         end associate
+         angle = theta
+      end associate
+   end subroutine hinges_at
 
    !> True unless joints of their own stand behind the coordinates, or hinges may change their laws at times that are not known
    !> before. Prestressed hinges, and those that are held or latched, do not.
@@ -226,17 +258,25 @@ contains
       if (allocated(self%modes)) call self%modes%forget()
    end subroutine forget_modes
 
-   !> Power of the loads and dissipated power.
-   subroutine quadratures(self, t, q, p, rate)
+   !> Power of the loads and dissipated power. The rates of relaxing hinges and the moments in locked ones come from the kernel.
+   subroutine quadratures(self, t, y, rate, ok)
       class(motion_type), intent(inout) :: self
       real(wp), intent(in) :: t
-      real(wp), contiguous, intent(in) :: q(:), p(:)
+      real(wp), contiguous, intent(in) :: y(:)
       real(wp), intent(out) :: rate(:)
-      real(wp) :: none(0)
-      associate (dynamics => self%dynamics)
-         if (dynamics%varying) call dynamics%refresh(t, q, p)
+      logical, intent(out) :: ok
+      real(wp) :: acceleration(self%n_dof), joint_rate(self%n_q - self%n_dof)
+
+      ok = .true.
+      associate (dynamics => self%dynamics, r => self%n_q, m => self%n_dof)
+         if (r > m .or. (dynamics%driven .and. has_slaves(dynamics%scene))) then
+            call dynamics%accelerations(t, y(1:r), y(r + 1:r + m), acceleration, ok)
+            if (r > m) call relaxation_rates(dynamics%scene%hinges, dynamics%work%moment, y(m + 1:r), joint_rate)
+         else if (dynamics%varying) then
+            call dynamics%refresh(t, y(1:r), y(r + 1:r + m))
+         end if
+         call powers(self, y(1:r), y(r + 1:r + m), joint_rate, rate)
       end associate
-      call powers(self, q, p, none, rate)
    end subroutine quadratures
 
    !> Margins of the laws of hinges.
@@ -262,6 +302,7 @@ contains
       associate (hinges => self%dynamics%scene%hinges, r => self%n_q, m => self%n_dof)
          if (.not. (hinges%driven .or. self%events%watches)) then
             call self%dynamics%set_regime(t, t_to)
+            if (self%ledger .and. .not. t > 0.0_wp) call self%begin_quadratures(energy_of(self, y))
             return
          end if
          if (t > 0.0_wp) then
@@ -279,6 +320,7 @@ contains
             call self%dynamics%set_regime(t, t_to)
             self%events%span = t_end
             if (self%events%watches) call self%events%begin(self%dynamics, y(1:r), y(r + 1:r + m), error)
+            if (self%ledger) call self%begin_quadratures(energy_of(self, y))
          end if
       end associate
       call forget_hinges(self)
@@ -437,11 +479,10 @@ contains
             jac(1, r + 3) = y(2)
             jac(2, r + 3) = -y(1)
          end if
-         if (self%ledger) call power_rows(self, y(1:r), y(r + 1:r + m), jac(r + m + 1:, :))
       end associate
    end subroutine jacobian
 
-   !> Factor 1 - gamma J in O(n), J without the rows of the two powers. With locked hinges or bubbles by the dense
+   !> Factor 1 - gamma J in O(n). With locked hinges or bubbles by the dense
    !> Jacobian: O(n^3).
    subroutine factorise_newton(self, t, y, gamma, fresh, ok)
       class(motion_type), intent(inout) :: self
@@ -497,43 +538,5 @@ contains
          call relaxation_tangent(scene%hinges, moment, dq(self%n_dof + 1:), column)
       end associate
    end subroutine relaxation_column
-
-   !> Rows of the two powers, by central differences that are exact: the power of the loads is linear in p, and its
-   !> dependence on phi_j is that of the lever l_j W_j n_j; the dissipated power is quadratic in q and p.
-   subroutine power_rows(self, q, p, rows)
-      class(motion_type), intent(in) :: self
-      real(wp), intent(in) :: q(:), p(:)
-      real(wp), intent(inout) :: rows(:, :)
-      real(wp) :: dq(self%n_q), dp(self%n_dof), force(2), omega
-      integer :: j, k
-
-      associate (r => self%n_q, m => self%n_dof, scene => self%dynamics%scene, forces => self%dynamics%forces, &
-                 loaded => self%dynamics%regime%on_nodes)
-         dq = 0.0_wp
-         dp = 0.0_wp
-         do j = 1, m
-            dp(j) = 1.0_wp
-            rows(1, r + j) = load_power(scene, q, dp, forces%base, loaded, forces%node)
-            rows(2, r + j) = 0.5_wp*(dissipated_power(scene, q, p + dp) - dissipated_power(scene, q, p - dp))
-            dp(j) = 0.0_wp
-         end do
-         if (r > m) then ! only relaxing hinges dissipate by q
-            do j = 1, r
-               dq(j) = 1.0_wp
-               rows(2, j) = 0.5_wp*(dissipated_power(scene, q + dq, p) - dissipated_power(scene, q - dq, p))
-               dq(j) = 0.0_wp
-            end do
-         end if
-         if (.not. loaded) return
-         omega = 0.0_wp
-         if (self%free) omega = p(3)
-         force = 0.0_wp
-         do k = scene%n, 1, -1
-            force = force + forces%node(:, k)
-            j = scene%phi_at() + k
-            rows(1, j) = -scene%rods(scene%rod_of(k))%length*(omega + p(j))*(cos(q(j))*force(1) + sin(q(j))*force(2))
-         end do
-      end associate
-   end subroutine power_rows
 
 end module rodyn_motion

@@ -42,6 +42,10 @@ module rodyn_cvode_integrator
       type(SUNNonlinearSolver), pointer :: nonlinear => null()
       type(callback_data), pointer :: data => null()
       type(solver_statistics) :: before_restart !! counts up to the last restart, which resets CVODE's
+      real(wp) :: t_before = 0.0_wp                       !! start of the last internal step [s]
+      real(wp), allocatable :: sums_before(:)             !! quadratures there
+      real(wp), allocatable, dimension(:) :: rate_before, rate !! and their rates, there and at its end
+      real(wp), allocatable :: sum_of_errors(:)           !! of the last integral of `integrate_quadratures`
    contains
       procedure :: start
       procedure :: advance
@@ -92,7 +96,10 @@ contains
       self%data%atol = options%atol
       call check(error, FSUNContext_Create(c_null_ptr, self%context), 'SUNContext_Create')
       if (allocated(error)) return
-      self%state => new_nvector(system%n_states, system%n_controlled, self%context)
+      self%state => new_nvector(system%n_controlled, system%n_controlled, self%context)
+      associate (n => system%n_states - system%n_controlled)
+         allocate (self%sums_before(n), self%rate_before(n), self%rate(n), self%sum_of_errors(n), source=0.0_wp)
+      end associate
       self%memory = FCVodeCreate(self%multistep, self%context)
       if (.not. (associated(self%state) .and. c_associated(self%memory))) call raise(error, 'CVodeCreate: out of memory')
    end subroutine new_cvode_integrator
@@ -109,7 +116,9 @@ contains
       call self%begin_interval(t, y, error)
       if (allocated(error)) return
       content => content_of(self%state)
-      content%values(:) = y
+      content%values(:) = y(:self%system%n_controlled)
+      if (size(self%rate) > 0) call rates_of_quadratures(self, t, content%values, self%rate, error)
+      if (allocated(error)) return
       if (self%initialized) then
          self%before_restart = self%statistics()
          call check(error, FCVodeReInit(self%memory, t, self%state), 'CVodeReInit', t)
@@ -216,9 +225,10 @@ contains
       if (.not. allocated(error) .and. t_out < self%t_good) then
          call check(error, FCVodeGetDky(self%memory, t_out, 0_c_int, self%state), 'CVodeGetDky', t_out)
          if (.not. allocated(error)) then
-            y(:) = content%values
+            y(:self%system%n_controlled) = content%values
             t = t_out
-            return
+            if (size(self%rate) > 0) call quadratures_within(self, t_out, y, error)
+            if (.not. allocated(error)) return
          end if
       end if
       y(:) = self%y_good
@@ -261,9 +271,129 @@ contains
          call name_cause(self, error)
          return
       end if
+      self%t_before = self%t_good
       self%t_good = t_reached(1)
-      self%y_good(:) = content%values
+      self%y_good(:self%system%n_controlled) = content%values
+      if (size(self%rate) > 0) call add_quadratures(self, error)
    end subroutine one_step
+
+   !> Quadratures at the end of the step that CVODE has made. They are no states of CVODE's: its iterations and its error test
+   !> do not look at them. They are integrals over its polynomial.
+   subroutine add_quadratures(self, error)
+      class(cvode_integrator), intent(inout) :: self
+      type(error_type), allocatable, intent(inout) :: error
+      real(wp) :: increment(size(self%rate))
+
+      associate (n => self%system%n_controlled)
+         self%sums_before(:) = self%y_good(n + 1:)
+         self%rate_before(:) = self%rate
+         call rates_of_quadratures(self, self%t_good, self%y_good(:n), self%rate, error)
+         if (allocated(error)) return
+         call integrate_quadratures(self, self%t_good, self%rate, increment, error)
+         if (allocated(error)) return
+         self%y_good(n + 1:) = self%sums_before + increment
+         call self%system%note_quadratures(self%y_good(n + 1:), self%sum_of_errors)
+      end associate
+   end subroutine add_quadratures
+
+   !> Quadratures at an output inside the last step.
+   subroutine quadratures_within(self, t, y, error)
+      class(cvode_integrator), intent(inout) :: self
+      real(wp), intent(in) :: t !! [s]
+      real(wp), contiguous, intent(inout) :: y(:)
+      type(error_type), allocatable, intent(inout) :: error
+      real(wp), dimension(size(self%rate)) :: rate, increment
+
+      associate (n => self%system%n_controlled)
+         call rates_of_quadratures(self, t, y(:n), rate, error)
+         if (.not. allocated(error)) call integrate_quadratures(self, t, rate, increment, error)
+         if (.not. allocated(error)) y(n + 1:) = self%sums_before + increment
+      end associate
+   end subroutine quadratures_within
+
+   !> Integral of the rates of the quadratures from the start of the last step: a panel that is too long for them is halved.
+   subroutine integrate_quadratures(self, t_end, rate_end, total, error)
+      class(cvode_integrator), intent(inout) :: self
+      real(wp), intent(in) :: t_end       !! [s]
+      real(wp), intent(in) :: rate_end(:) !! there
+      real(wp), intent(out) :: total(:)
+      type(error_type), allocatable, intent(inout) :: error
+      integer, parameter :: deepest = 20 !! halvings
+      real(wp) :: ends(0:deepest), rates(size(total), 0:deepest) ! of panels that wait
+      real(wp), dimension(size(total)) :: first, middle, part, off
+      real(wp) :: t, tolerance
+      integer :: depth
+
+      depth = 0
+      t = self%t_before
+      first = self%rate_before
+      ends(0) = t_end
+      rates(:, 0) = rate_end
+      total = 0.0_wp
+      self%sum_of_errors = 0.0_wp
+      do while (depth >= 0)
+         call integrate_panel(self, t, ends(depth), first, rates(:, depth), part, middle, off, error)
+         if (allocated(error)) return
+         tolerance = max(self%system%quadrature_tolerance(self%options%rtol, self%sums_before + total + part), &
+                         8.0_wp*epsilon(1.0_wp)*(t_end - self%t_before)*maxval(abs(middle)))
+         if (maxval(off) <= tolerance .or. depth == deepest) then
+            total = total + part
+            self%sum_of_errors = self%sum_of_errors + off
+            t = ends(depth)
+            first = rates(:, depth)
+            depth = depth - 1
+         else
+            ends(depth + 1) = t + 0.5_wp*(ends(depth) - t)
+            rates(:, depth + 1) = middle
+            depth = depth + 1
+         end if
+      end do
+   end subroutine integrate_quadratures
+
+   !> Integral over a panel by the seven points of Kronrod's extension of Lobatto's rule of four (Gander & Gautschi, BIT 40,
+   !> 2000), and what it is off: less than its distance to that rule, by as much as that is less than its distance to Simpson's.
+   subroutine integrate_panel(self, t0, t1, first, last, value, middle, off, error)
+      class(cvode_integrator), intent(inout) :: self
+      real(wp), intent(in) :: t0, t1           !! [s]
+      real(wp), intent(in) :: first(:), last(:) !! rates there
+      real(wp), intent(out) :: value(:), middle(:), off(:) !! integrals; rates in the middle; estimated errors
+      type(error_type), allocatable, intent(inout) :: error
+      real(wp), parameter :: outer = sqrt(2.0_wp/3.0_wp), inner = sqrt(0.2_wp)
+      real(wp), parameter :: points(5) = [-outer, -inner, 0.0_wp, inner, outer]
+      type(vector_content), pointer :: content
+      real(wp) :: rates(size(value), 5), half
+      real(wp), dimension(size(value)) :: lobatto, simpson
+      integer :: i
+
+      half = 0.5_wp*(t1 - t0)
+      content => content_of(self%state)
+      do i = 1, 5
+         associate (t => t0 + half*(1.0_wp + points(i)))
+            call check(error, FCVodeGetDky(self%memory, t, 0_c_int, self%state), 'CVodeGetDky', t)
+            if (allocated(error)) return
+            call rates_of_quadratures(self, t, content%values, rates(:, i), error)
+            if (allocated(error)) return
+         end associate
+      end do
+      middle = rates(:, 3)
+      value = (half/1470.0_wp)*(77.0_wp*(first + last) + 432.0_wp*(rates(:, 1) + rates(:, 5)) + &
+                                625.0_wp*(rates(:, 2) + rates(:, 4)) + 672.0_wp*middle)
+      lobatto = (half/6.0_wp)*(first + last + 5.0_wp*(rates(:, 2) + rates(:, 4)))
+      simpson = (half/3.0_wp)*(first + last + 4.0_wp*middle)
+      off = abs(value - lobatto)
+      where (off > 0.0_wp) off = off*min(1.0_wp, off/max(abs(value - simpson), tiny(1.0_wp)))
+   end subroutine integrate_panel
+
+   subroutine rates_of_quadratures(self, t, y, rate, error)
+      class(cvode_integrator), intent(inout) :: self
+      real(wp), intent(in) :: t                !! [s]
+      real(wp), contiguous, intent(in) :: y(:) !! (n_controlled)
+      real(wp), intent(out) :: rate(:)
+      type(error_type), allocatable, intent(inout) :: error
+      logical :: ok
+      call self%system%quadratures(t, y, rate, ok)
+      if (.not. ok) call raise(error, 'quadratures at t = '//time_text(t)//' s: the right-hand side could not be evaluated')
+   end subroutine rates_of_quadratures
 
    !> Which functions made CVODE stop.
    subroutine take_event(self, error)

@@ -42,12 +42,13 @@ contains
       ok = info == 0
    end subroutine factorise
 
-   !> x <- (1 - gamma J)^-1 x.
+   !> x <- (1 - gamma J)^-1 x. What is behind n elements is not touched.
    subroutine solve(self, x)
       class(dense_newton), intent(in) :: self
-      real(wp), intent(inout) :: x(:)
-      integer :: info
-      call dgetrs('N', size(x), 1, self%matrix, size(x), self%pivots, x, size(x), info)
+      real(wp), contiguous, intent(inout) :: x(:)
+      integer :: info, n
+      n = size(self%pivots)
+      call dgetrs('N', n, 1, self%matrix, n, self%pivots, x, n, info)
    end subroutine solve
 
 end module rodyn_dense_newton

@@ -12,17 +12,11 @@ module rodyn_dop853_integrator
    use rodyn_ode, only: ode_system
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, time_text
    use rodyn_event_search, only: find_event
-   use rodyn_dop853_tableau, only: c2, c3, c4, c5, c6, c7, c8, c9, c10, c11, c12, a2_1, a3_1, a3_2, a4_1, &
-      a4_3, a5_1, a5_3, a5_4, a6_1, a6_4, a6_5, a7_1, a7_4, a7_5, a7_6, a8_1, a8_4, a8_5, a8_6, a8_7, a9_1, &
-      a9_4, a9_5, a9_6, a9_7, a9_8, a10_1, a10_4, a10_5, a10_6, a10_7, a10_8, a10_9, a11_1, a11_4, a11_5, &
-      a11_6, a11_7, a11_8, a11_9, a11_10, a12_1, a12_4, a12_5, a12_6, a12_7, a12_8, a12_9, a12_10, a12_11, &
-      b1, b6, b7, b8, b9, b10, b11, b12, e5_1, e5_6, e5_7, e5_8, e5_9, e5_10, e5_11, e5_12, e3_1, e3_6, e3_7, &
-      e3_8, e3_9, e3_10, e3_11, e3_12
+   use rodyn_dop853_step, only: n_stages, stages, add_increment, error_norm, quadrature_errors
+   use rodyn_quadrature_refinement, only: quadrature_refinement
    implicit none (type, external)
    private
    public :: dop853_integrator, new_dop853_integrator
-
-   integer, parameter :: n_stages = 12
 
    type, extends(integrator_type) :: dop853_integrator
       private
@@ -36,6 +30,8 @@ module rodyn_dop853_integrator
       real(wp), allocatable :: y_before(:), f_before(:) !! at t_before
       real(wp), allocatable :: k(:, :)   !! rates of the stages (n_states, 12)
       real(wp), allocatable :: stage(:), increment(:), y_new(:) !! workspace
+      real(wp), allocatable :: quadrature_error(:) !! in the last step (n_states - n_controlled)
+      type(quadrature_refinement) :: refinement
       real(wp) :: t_first = 0.0_wp       !! start of the interval, where the grid of fixed steps begins [s]
       integer(i8) :: n_grid = 0, i_grid = 0 !! fixed steps of the interval; steps done
       real(wp), allocatable :: y_event(:) !! workspace, if there are events
@@ -66,7 +62,7 @@ contains
       self%options = options
       associate (n => system%n_states)
          allocate (self%y(n), self%lost(n), self%f(n), self%y_before(n), self%f_before(n), self%k(n, n_stages), &
-                   self%stage(n), self%increment(n), self%y_new(n), source=0.0_wp)
+                   self%stage(n), self%increment(n), self%y_new(n), self%quadrature_error(n - system%n_controlled), source=0.0_wp)
       end associate
       self%counts%last_order = 8
    end subroutine new_dop853_integrator
@@ -139,9 +135,29 @@ contains
          call stages(self%system, size(y), self%t_before, h, self%y_before, self%f_before, self%k, self%stage, ok)
          self%counts%n_rhs = self%counts%n_rhs + n_stages - 1
          call add_increment(size(y), h, self%k, self%increment)
+         if (size(self%quadrature_error) > 0) call control_quadratures(self, self%t_before, h, self%y_before)
          y = self%y_before + self%increment
       end associate
    end subroutine state_within
+
+   !> Estimate the errors of the quadratures in the step just made; if they are too large, refine them (not in fixed steps, in
+   !> which the motion has no tolerance either).
+   subroutine control_quadratures(self, t, h, y)
+      class(dop853_integrator), intent(inout) :: self
+      real(wp), intent(in) :: t, h !! [s]
+      real(wp), intent(in) :: y(:) !! at the start of the step
+      real(wp) :: tolerance
+      logical :: ok
+
+      associate (m => self%system%n_controlled, options => self%options, error => self%quadrature_error)
+         call quadrature_errors(m, h, self%k, error)
+         if (self%n_grid > 0) return
+         tolerance = self%system%quadrature_tolerance(options%rtol, y(m + 1:) + self%increment(m + 1:))
+         if (maxval(error) <= tolerance) return
+         call self%refinement%refine(self%system, t, y, t + h, options%rtol, options%atol, tolerance, &
+                                     self%increment(m + 1:), error, self%counts%n_rhs, ok)
+      end associate
+   end subroutine control_quadratures
 
    !> Did an event function become negative in the last step? Then the step ends there.
    subroutine look_for_event(self)
@@ -199,6 +215,13 @@ contains
          rejected = .true.
          self%h = h*max(shrink, safety*norm**(-0.125_wp))
       end do
+      if (size(self%quadrature_error) > 0) then
+         call control_quadratures(self, self%t, h, self%y)
+         associate (last => self%system%n_controlled + 1)
+            self%y_new(last:) = self%y(last:) + (self%increment(last:) - self%lost(last:))
+            call self%system%note_quadratures(self%y_new(last:), self%quadrature_error)
+         end associate
+      end if
       call accept(self, h, t_new)
       if (self%system%n_events > 0) call look_for_event(self)
       if (self%n_grid > 0) return
@@ -282,90 +305,6 @@ contains
          text = 'the right-hand side was not finite, or no step is small enough'
       end if
    end function trouble
-
-   !> k_2..k_12 from k_1 = f.
-   subroutine stages(system, n, t, h, y, f, k, stage, ok)
-      class(ode_system), intent(inout) :: system
-      integer, intent(in) :: n
-      real(wp), intent(in) :: t, h
-      real(wp), intent(in) :: y(n), f(n)
-      real(wp), intent(inout) :: k(n, n_stages), stage(n)
-      logical, intent(out) :: ok
-
-      k(:, 1) = f
-      stage = y + h*(a2_1*k(:, 1))
-      call system%rhs(t + c2*h, stage, k(:, 2), ok)
-      if (.not. ok) return
-      stage = y + h*(a3_1*k(:, 1) + a3_2*k(:, 2))
-      call system%rhs(t + c3*h, stage, k(:, 3), ok)
-      if (.not. ok) return
-      stage = y + h*(a4_1*k(:, 1) + a4_3*k(:, 3))
-      call system%rhs(t + c4*h, stage, k(:, 4), ok)
-      if (.not. ok) return
-      stage = y + h*(a5_1*k(:, 1) + a5_3*k(:, 3) + a5_4*k(:, 4))
-      call system%rhs(t + c5*h, stage, k(:, 5), ok)
-      if (.not. ok) return
-      stage = y + h*(a6_1*k(:, 1) + a6_4*k(:, 4) + a6_5*k(:, 5))
-      call system%rhs(t + c6*h, stage, k(:, 6), ok)
-      if (.not. ok) return
-      stage = y + h*(a7_1*k(:, 1) + a7_4*k(:, 4) + a7_5*k(:, 5) + a7_6*k(:, 6))
-      call system%rhs(t + c7*h, stage, k(:, 7), ok)
-      if (.not. ok) return
-      stage = y + h*(a8_1*k(:, 1) + a8_4*k(:, 4) + a8_5*k(:, 5) + a8_6*k(:, 6) + a8_7*k(:, 7))
-      call system%rhs(t + c8*h, stage, k(:, 8), ok)
-      if (.not. ok) return
-      stage = y + h*(a9_1*k(:, 1) + a9_4*k(:, 4) + a9_5*k(:, 5) + a9_6*k(:, 6) + a9_7*k(:, 7) + &
-                       a9_8*k(:, 8))
-      call system%rhs(t + c9*h, stage, k(:, 9), ok)
-      if (.not. ok) return
-      stage = y + h*(a10_1*k(:, 1) + a10_4*k(:, 4) + a10_5*k(:, 5) + a10_6*k(:, 6) + a10_7*k(:, 7) + &
-                       a10_8*k(:, 8) + a10_9*k(:, 9))
-      call system%rhs(t + c10*h, stage, k(:, 10), ok)
-      if (.not. ok) return
-      stage = y + h*(a11_1*k(:, 1) + a11_4*k(:, 4) + a11_5*k(:, 5) + a11_6*k(:, 6) + a11_7*k(:, 7) + &
-                       a11_8*k(:, 8) + a11_9*k(:, 9) + a11_10*k(:, 10))
-      call system%rhs(t + c11*h, stage, k(:, 11), ok)
-      if (.not. ok) return
-      stage = y + h*(a12_1*k(:, 1) + a12_4*k(:, 4) + a12_5*k(:, 5) + a12_6*k(:, 6) + a12_7*k(:, 7) + &
-                       a12_8*k(:, 8) + a12_9*k(:, 9) + a12_10*k(:, 10) + a12_11*k(:, 11))
-      call system%rhs(t + c12*h, stage, k(:, 12), ok)
-      if (.not. ok) return
-   end subroutine stages
-
-   !> h sum b_i k_i.
-   pure subroutine add_increment(n, h, k, increment)
-      integer, intent(in) :: n
-      real(wp), intent(in) :: h
-      real(wp), intent(in) :: k(n, n_stages)
-      real(wp), intent(out) :: increment(n)
-      increment = h*(b1*k(:, 1) + b6*k(:, 6) + b7*k(:, 7) + b8*k(:, 8) + b9*k(:, 9) + b10*k(:, 10) + &
-                      b11*k(:, 11) + b12*k(:, 12))
-   end subroutine add_increment
-
-   !> Root mean square of error/tolerance over the controlled states; Hairer's mix of the two estimates.
-   pure real(wp) function error_norm(n, h, k, y, y_new, rtol, atol)
-      integer, intent(in) :: n
-      real(wp), intent(in) :: h
-      real(wp), intent(in) :: k(:, :)
-      real(wp), intent(in) :: y(n), y_new(n)
-      real(wp), intent(in) :: rtol, atol
-      real(wp) :: sum_5, sum_3, weight, e5, e3
-      integer :: i
-
-      sum_5 = 0.0_wp
-      sum_3 = 0.0_wp
-      do i = 1, n
-         weight = 1.0_wp/(atol + rtol*max(abs(y(i)), abs(y_new(i))))
-         e5 = e5_1*k(i, 1) + e5_6*k(i, 6) + e5_7*k(i, 7) + e5_8*k(i, 8) + e5_9*k(i, 9) + &
-               e5_10*k(i, 10) + e5_11*k(i, 11) + e5_12*k(i, 12)
-         e3 = e3_1*k(i, 1) + e3_6*k(i, 6) + e3_7*k(i, 7) + e3_8*k(i, 8) + e3_9*k(i, 9) + &
-               e3_10*k(i, 10) + e3_11*k(i, 11) + e3_12*k(i, 12)
-         sum_5 = sum_5 + (e5*weight)**2
-         sum_3 = sum_3 + (e3*weight)**2
-      end do
-      error_norm = 0.0_wp
-      if (sum_5 + sum_3 > 0.0_wp) error_norm = abs(h)*sum_5/sqrt(n*(sum_5 + 0.01_wp*sum_3))
-   end function error_norm
 
    !> Length of the first step (Hairer, Norsett & Wanner, sec. II.4).
    subroutine first_step(self, error)

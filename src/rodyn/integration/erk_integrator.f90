@@ -6,7 +6,7 @@
 !>
 !> The tables are SUNDIALS' own: Heun-Euler 2(1), Bogacki-Shampine 3(2), Zonneveld 4(3), Cash-Karp 5(4), Verner 6(5),
 !> Fehlberg 8(7); order 7 is Fehlberg's pair with its two solutions exchanged. Fehlberg's error estimate is blind to
-!> pure quadratures, y' = f(t). A right-hand side that cannot be evaluated ends an ERKStep run at once, without
+!> pure quadratures, y' = f(t); those behind the states have one of their own. A right-hand side that cannot be evaluated ends an ERKStep run at once, without
 !> trying a shorter step.
 module rodyn_erk_integrator
    use, intrinsic :: iso_c_binding, only: c_ptr, c_int, c_long, c_double, c_null_ptr, c_associated, c_loc, c_funloc, c_f_pointer
@@ -16,6 +16,7 @@ module rodyn_erk_integrator
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, time_text
    use rodyn_nvector, only: new_nvector, free_nvector, vector_content, content_of
    use rodyn_event_search, only: find_event
+   use rodyn_quadrature_refinement, only: quadrature_refinement
    use rodyn_sundials_base, only: callback_data, rhs_shim, weights_shim, quiet_handler, all_finite, raise_return_code
    use fsundials_context_mod, only: FSUNContext_Create, FSUNContext_Free
    use fsundials_nvector_mod, only: N_Vector
@@ -47,10 +48,15 @@ module rodyn_erk_integrator
       integer :: order = 0
       real(wp), allocatable :: a(:, :)        !! (stages, stages): a(j, i) multiplies rate j in stage i
       real(wp), allocatable :: b(:), c(:)     !! (stages)
+      real(wp), allocatable :: b_other(:)     !! weights of the embedded method (stages)
       real(wp), allocatable :: rates(:, :)    !! of the stages of an output step (n_states, stages)
       real(wp) :: t_before = 0.0_wp           !! start of the last internal step [s]
       real(wp), allocatable :: y_before(:)    !! state there (n_states)
       real(wp), allocatable, dimension(:) :: f_before, f_now, y_event !! for events: rates at both ends of the step; workspace
+      real(wp), allocatable :: rate(:)        !! rates of the quadratures at the end of the last internal step
+      real(wp), allocatable :: power(:, :)    !! and in its stages (n_states - n_controlled, stages)
+      real(wp), allocatable :: quadrature_error(:) !! of the last step, or output step (n_states - n_controlled)
+      type(quadrature_refinement) :: refinement
       real(wp) :: t_first = 0.0_wp            !! start of the interval, where the grid of fixed steps begins [s]
       integer(i8) :: n_grid = 0, i_grid = 0   !! fixed steps of the interval; steps done
       real(wp) :: stop_in_force = -huge(1.0_wp) !! the stop time ARKODE knows [s]
@@ -102,6 +108,9 @@ contains
       call check(error, FSUNContext_Create(c_null_ptr, self%context), 'SUNContext_Create')
       if (allocated(error)) return
       self%state => new_nvector(system%n_states, system%n_controlled, self%context)
+      associate (n => system%n_states - system%n_controlled)
+         allocate (self%rate(n), self%quadrature_error(n), source=0.0_wp)
+      end associate
       if (.not. associated(self%state)) call raise(error, 'N_VNewEmpty: out of memory')
    end subroutine new_erk_integrator
 
@@ -113,6 +122,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       type(vector_content), pointer :: content
+      logical :: ok
 
       call self%begin_interval(t, y, error)
       if (allocated(error)) return
@@ -123,6 +133,7 @@ contains
       self%stop_in_force = -huge(1.0_wp)
       if (self%system%n_events > 0) call begin_events(self, error)
       if (allocated(error)) return
+      if (size(self%rate) > 0) call self%system%quadratures(t, self%y_good(:self%system%n_controlled), self%rate, ok)
       if (c_associated(self%memory)) then
          self%before_restart = self%statistics()
          call check(error, FERKStepReInit(self%memory, c_funloc(rhs_shim), t, self%state), 'ERKStepReInit', t)
@@ -171,8 +182,10 @@ contains
 
       call load_table(self%order, address, error)
       if (allocated(error)) return
-      call copy_table(address, self%a, self%b, self%c)
+      call copy_table(address, self%a, self%b, self%c, self%b_other)
       allocate (self%rates(self%system%n_states, size(self%b)))
+      if (size(self%rate) > 0) allocate (self%power(size(self%rate), size(self%b)), &
+                                         self%data%recent(size(self%rate), size(self%b)), source=0.0_wp)
       call check(error, FERKStepSetTable(self%memory, address), 'ERKStepSetTable')
       call FARKodeButcherTable_Free(address)
    end subroutine choose_table
@@ -244,9 +257,10 @@ contains
    end function nothing_to_do
 
    !> The coefficients as arrays.
-   subroutine copy_table(address, a, b, c)
+   subroutine copy_table(address, a, b, c, d)
       type(c_ptr), intent(in) :: address
       real(wp), allocatable, intent(out) :: a(:, :), b(:), c(:)
+      real(wp), allocatable, intent(out), optional :: d(:) !! the embedded method's b
 
       type(butcher_table), pointer :: table
       type(c_ptr), pointer :: rows(:)
@@ -265,6 +279,9 @@ contains
       b = values
       call c_f_pointer(table%c, values, [stages])
       c = values
+      if (.not. present(d)) return
+      call c_f_pointer(table%d, values, [stages])
+      d = values
    end subroutine copy_table
 
    !> Step past t_out, but never past the stop time; an output inside the last step gets a step of its own.
@@ -350,8 +367,66 @@ contains
       self%y_before(:) = self%y_good
       self%t_good = t_reached(1)
       self%y_good(:) = content%values
+      if (size(self%rate) > 0) call add_quadratures(self)
       if (self%system%n_events > 0) call look_for_event(self, error)
    end subroutine one_step
+
+   !> Quadratures at the end of the last internal step, from the rates in its stages, which are those of the last calls.
+   subroutine add_quadratures(self)
+      class(erk_integrator), intent(inout) :: self
+      integer :: j, n, back
+
+      n = size(self%b)
+      back = merge(0, 1, first_same_as_last(self)) ! else a call at the new state follows the stages
+      self%power(:, 1) = self%rate
+      do j = 2, n
+         self%power(:, j) = self%data%recent(:, modulo(self%data%latest - 1 - back - (n - j), n) + 1)
+      end do
+      self%rate(:) = self%data%recent(:, self%data%latest)
+      associate (first => self%system%n_controlled + 1)
+         call integrate_quadratures(self, self%t_good, self%power, self%y_good(first:))
+         call self%system%note_quadratures(self%y_good(first:), self%quadrature_error)
+      end associate
+   end subroutine add_quadratures
+
+   !> Quadratures at the end of a step from the start of the last internal one, refined where the rates in its stages show that
+   !> they have too large an error (not in fixed steps, in which the motion has no tolerance either).
+   subroutine integrate_quadratures(self, t, power, values)
+      class(erk_integrator), intent(inout) :: self
+      real(wp), intent(in) :: t            !! [s]
+      real(wp), intent(in) :: power(:, :)  !! (n_states - n_controlled, stages)
+      real(wp), intent(inout) :: values(:) !! (n_states - n_controlled)
+      real(wp) :: integral(size(values)), tolerance
+      logical :: ok
+
+      associate (h => t - self%t_before, before => self%y_before(self%system%n_controlled + 1:), options => self%options)
+         integral = h*matmul(power, self%b)
+         self%quadrature_error(:) = h*estimate(self, power)
+         if (.not. options%fixed_step > 0.0_wp) then
+            tolerance = self%system%quadrature_tolerance(options%rtol, before + integral)
+            if (maxval(self%quadrature_error) > tolerance) &
+               call self%refinement%refine(self%system, self%t_before, self%y_before, t, options%rtol, options%atol, tolerance, &
+                                           integral, self%quadrature_error, self%data%n_rhs, ok)
+         end if
+         values = before + integral
+      end associate
+   end subroutine integrate_quadratures
+
+   !> Error of mean rates. Fehlberg's pairs cannot see it: on a quadrature both are the rule of Newton and Cotes with seven
+   !> points. Its distance to Weddle's rule, of two degrees less, is taken.
+   pure function estimate(self, power) result(error)
+      class(erk_integrator), intent(in) :: self
+      real(wp), intent(in) :: power(:, :) !! (n_states - n_controlled, stages)
+      real(wp) :: error(size(power, 1))
+      integer, parameter :: even(7) = [1, 8, 10, 6, 9, 7, 11] !! Fehlberg's stages at 0, 1/6, ... 1
+      real(wp), parameter :: sixth_difference(7) = [1.0_wp, -6.0_wp, 15.0_wp, -20.0_wp, 15.0_wp, -6.0_wp, 1.0_wp]
+
+      if (self%order < 7) then
+         error = abs(matmul(power, self%b - self%b_other))
+      else
+         error = abs(matmul(power(:, even), sixth_difference))/840.0_wp
+      end if
+   end function estimate
 
    !> Rates at the start, for the first look into a step.
    subroutine begin_events(self, error)
@@ -443,6 +518,9 @@ contains
       do i = 1, size(self%b)
          if (abs(self%b(i)) > 0.0_wp) y(:) = y + (h*self%b(i))*self%rates(:, i)
       end do
+      associate (first => self%system%n_controlled + 1)
+         if (size(self%rate) > 0) call integrate_quadratures(self, t_out, self%rates(first:, :), y(first:))
+      end associate
       if (.not. all_finite(y)) call raise(error, 'output at t = '//time_text(t_out)//' s: the state is not finite')
    end subroutine output_step
 

@@ -25,6 +25,7 @@ module rodyn_gauss_integrator
       residual, add, accumulate, copy
    use rodyn_gauss_collocation, only: gauss_collocation, new_gauss_collocation
    use rodyn_modal_reply, only: modal_reply
+   use rodyn_quadrature_refinement, only: quadrature_refinement
    implicit none (type, external)
    private
    public :: gauss_integrator, new_gauss_integrator
@@ -73,7 +74,10 @@ module rodyn_gauss_integrator
       real(wp), allocatable :: modal(:, :), reply(:, :), stiff(:, :) !! workspace (s, modes)
       real(wp), allocatable :: rest(:), motion(:) !! v.q and v.p at the start of a step (modes)
       real(wp), allocatable :: guess(:, :)   !! workspace (s, n_dof)
-      real(wp), allocatable :: node_state(:), node_rate(:) !! workspace: (q, p) at one node; rates of the quadratures
+      real(wp), allocatable :: node_state(:), node_rate(:) !! workspace: (q, p) at one node; rates of the quadratures there
+      real(wp), allocatable :: power(:, :)   !! rates of the quadratures at the nodes of a step (s, n_states - 2 n_dof)
+      real(wp), allocatable :: quadrature_error(:) !! in the last step (n_states - 2 n_dof)
+      type(quadrature_refinement) :: refinement
       real(wp), allocatable :: weight(:)     !! 1/tolerance of the rates (n_dof)
       real(wp), allocatable :: y(:), lost(:) !! state at t, and what rounding took from it (n_states)
       real(wp), allocatable :: y_before(:)   !! state at t_before
@@ -131,7 +135,7 @@ contains
       allocate (self%now, self%spare)
       associate (n => system%n_states, m => self%mechanics%n_dof)
          allocate (self%y(n), self%lost(n), self%y_before(n), self%increment(n), self%weight(m), self%guess(s, m), &
-                   self%node_state(2*m), self%node_rate(n - 2*m), &
+                   self%node_state(2*m), self%node_rate(n - 2*m), self%power(s, n - 2*m), self%quadrature_error(n - 2*m), &
                    source=0.0_wp)
          call allocate_record(self%last, m)
          call allocate_record(self%trial, m)
@@ -224,7 +228,8 @@ contains
       rate = self%rate
       call iterate(self, self%t_before, self%y_before, ok)
       self%rate = rate
-      call form_increment(self, self%t_before, self%y_before)
+      call form_increment(self, self%y_before)
+      if (size(self%quadrature_error) > 0) call add_quadratures(self, self%t_before, self%y_before)
       y = self%y_before + self%increment
       call swap_matrices(self%now, self%spare)
    end subroutine inner_state
@@ -261,7 +266,7 @@ contains
          if (ok) call iterate(self, self%t, self%y, ok)
          estimate = huge(1.0_wp)
          if (ok) then
-            call form_increment(self, self%t, self%y, estimate)
+            call form_increment(self, self%y, estimate)
             ok = all(ieee_is_finite(self%increment))
          end if
          if (self%n_grid > 0) then
@@ -282,7 +287,10 @@ contains
          end if
       end do
       if (modulo(self%n_steps, degree_interval) == 0) call choose_degree(self)
+      if (size(self%quadrature_error) > 0) call add_quadratures(self, self%t, self%y)
       call accept(self, h, t_new)
+      if (size(self%quadrature_error) > 0) &
+         call self%system%note_quadratures(self%y(self%system%n_controlled + 1:), self%quadrature_error)
       self%excess = self%excess + real(self%iterations - self%fewest, wp)
       self%fewest = min(self%fewest, self%iterations)
       if (self%n_grid == 0) call choose_next(self, h, t_new, estimate, rejected)
@@ -591,16 +599,15 @@ contains
       weighted_norm = sqrt(sum(square_sums(size(weight), x, weight))/real(size(x), wp))
    end function weighted_norm
 
-   !> Increment of all states over the step; and an estimate of its error in units of the tolerance.
+   !> Increment of q and p over the step; and an estimate of its error in units of the tolerance.
    !>
    !> F is a polynomial with Legendre coefficients C_0..C_7; the increments are h C_0 and h p + h^2 (C_0/2 - C_1/6).
    !> A vibration of frequency omega has C_k ~ (h omega)^k, and its error over the step is ~ (h omega)^17. The last
    !> coefficients are those of the fastest vibration that matters; how fast it is shows in how they fall off:
    !>     error ~ constant h |C_7, C_6| (|C_7, C_6|/|C_5, C_4|)^4.5.
-   subroutine form_increment(self, t, y, estimate)
+   subroutine form_increment(self, y, estimate)
       class(gauss_integrator), intent(inout) :: self
       real(wp), contiguous, intent(in) :: y(:)
-      real(wp), intent(in) :: t !! at the start of the step
       real(wp), intent(out), optional :: estimate
       real(wp) :: sums(s), high, low, ratio
       integer :: j, m
@@ -615,7 +622,6 @@ contains
          end do
       end associate
       if (self%mechanics%n_ignorable == 3) call turn_displacement(self, y)
-      if (size(y) > 2*m) call add_quadratures(self, t, self%increment(2*m + 1:))
       if (.not. present(estimate)) return
       high = sums(8) + sums(7)
       low = sums(6) + sums(5)
@@ -654,23 +660,45 @@ contains
       end associate
    end subroutine turn_displacement
 
-   !> Integrals of the states behind (q, p).
-   subroutine add_quadratures(self, t, increment)
+   !> Integrals of the states behind (q, p), by the nodes of the step or, if these are too few for them, refined (not in fixed
+   !> steps, in which the motion has no tolerance either).
+   subroutine add_quadratures(self, t, y)
       class(gauss_integrator), intent(inout) :: self
-      real(wp), intent(in) :: t
-      real(wp), intent(out) :: increment(:)
+      real(wp), intent(in) :: t    !! at the start of the step [s]
+      real(wp), intent(in) :: y(:) !! there
+      real(wp) :: tolerance
+      logical :: ok
       integer :: i
-      increment = 0.0_wp
-      associate (m => self%mechanics%n_dof, q => self%node_state(:self%mechanics%n_dof), &
-                 p => self%node_state(self%mechanics%n_dof + 1:2*self%mechanics%n_dof), rate => self%node_rate)
+
+      associate (m => self%mechanics%n_dof, h => self%now%h, error => self%quadrature_error)
          do i = 1, s
             self%node_state(:m) = self%trial%q(i, :)
             self%node_state(m + 1:) = self%trial%p(i, :)
-            call self%mechanics%quadratures(t + self%now%h*self%rule%c(i), q, p, rate)
-            increment = increment + self%now%h*self%rule%b(i)*rate
+            call self%system%quadratures(t + h*self%rule%c(i), self%node_state, self%node_rate, ok)
+            self%power(i, :) = self%node_rate
          end do
+         do i = 1, size(error)
+            self%increment(2*m + i) = h*sum(self%rule%b*self%power(:, i))
+            error(i) = h*neglected(matmul(self%rule%coefficients, self%power(:, i)))
+         end do
+         if (self%n_grid > 0) return
+         tolerance = self%system%quadrature_tolerance(self%options%rtol, y(2*m + 1:) + self%increment(2*m + 1:))
+         if (maxval(error) <= tolerance) return
+         call self%refinement%refine(self%system, t, y, t + h, self%options%rtol, self%options%atol, tolerance, &
+                                     self%increment(2*m + 1:), error, self%counts%n_rhs, ok)
       end associate
    end subroutine add_quadratures
+
+   !> What the rule neglects of the mean of a function, the part of degree 16, by how its last Legendre coefficients fall off.
+   pure real(wp) function neglected(coefficient)
+      real(wp), intent(in) :: coefficient(s) !! of P_0..P_7
+      real(wp) :: high, ratio
+      high = hypot(coefficient(8), coefficient(7))
+      neglected = 0.0_wp
+      if (.not. high > 0.0_wp) return
+      ratio = min(1.0_wp, high/hypot(coefficient(6), coefficient(5)))
+      neglected = high*ratio**4*sqrt(ratio)
+   end function neglected
 
    !> Make the trial the last step, and keep the digits that rounding takes from the state.
    subroutine accept(self, h, t_new)

@@ -9,18 +9,25 @@ module rodyn_ode
    public :: ode_system, mechanical_system
    public :: factorise_dense, solve_dense
 
-   !> A system of `n_states` equations, of which the first `n_controlled` take part in step-size control.
-   !> The others are pure quadratures (work, dissipated energy): no equation depends on them, and a run
-   !> with them makes the same steps as one without.
+   !> A system of `n_controlled` equations, and quadratures behind them (work, dissipated energy), `n_states` in all. No equation
+   !> depends on a quadrature, so a run with them makes the same steps as one without. Their error is controlled apart: that of
+   !> each step is held below rtol times the largest scale that they have had, in shorter steps of their own if need be.
    !>
    !> Implicit methods solve (1 - g df/dy) x = r by `factorise_newton` and `solve_newton`. A system that knows the
    !> structure of its Jacobian overrides both.
    type, abstract :: ode_system
       integer :: n_states = 0     !! length of y
-      integer :: n_controlled = 0 !! leading states in the error norm
+      integer :: n_controlled = 0 !! leading states: those in the error norm
       integer :: n_events = 0     !! functions whose sign changes end the smooth part of the run
+      real(wp) :: quadrature_base = 0.0_wp  !! what quadratures are compared with beside themselves, of their unit
+      real(wp) :: quadrature_scale = 0.0_wp !! the largest sum of that and their absolute values so far
+      real(wp), allocatable :: quadrature_error(:) !! their estimated errors, summed over the steps (n_states - n_controlled)
       type(dense_newton), private :: dense
    contains
+      procedure :: quadratures
+      procedure :: begin_quadratures
+      procedure :: quadrature_tolerance
+      procedure :: note_quadratures
       procedure :: event_functions
       procedure(rhs_interface), deferred :: rhs
       procedure(jacobian_interface), deferred :: jacobian
@@ -38,7 +45,6 @@ module rodyn_ode
       procedure(lanes_interface), deferred :: lane_accelerations
       procedure(modes_interface), deferred :: find_modes
       procedure :: forget_modes => nothing_to_forget
-      procedure(quadratures_interface), deferred :: quadratures
    end type mechanical_system
 
    abstract interface
@@ -71,38 +77,28 @@ module rodyn_ode
          type(stiff_modes), intent(inout) :: modes
          logical, intent(out) :: ok
       end subroutine modes_interface
-
-      !> Rates of the states behind (q, p).
-      subroutine quadratures_interface(self, t, q, p, rate)
-         import :: mechanical_system, wp
-         implicit none (type, external)
-         class(mechanical_system), intent(inout) :: self
-         real(wp), intent(in) :: t
-         real(wp), contiguous, intent(in) :: q(:), p(:) !! (n_dof)
-         real(wp), intent(out) :: rate(:)   !! (n_states - 2 n_dof)
-      end subroutine quadratures_interface
    end interface
 
    abstract interface
-      !> Right-hand side. Allocates nothing.
+      !> Right-hand side, that of the quadratures only where ydot has room for them. Allocates nothing.
       subroutine rhs_interface(self, t, y, ydot, ok)
          import :: ode_system, wp
          implicit none (type, external)
          class(ode_system), intent(inout) :: self
          real(wp), intent(in) :: t       !! time [s]
-         real(wp), contiguous, intent(in) :: y(:)    !! states (n_states)
-         real(wp), contiguous, intent(out) :: ydot(:) !! their rates (n_states)
+         real(wp), contiguous, intent(in) :: y(:)    !! states (n_states or n_controlled)
+         real(wp), contiguous, intent(out) :: ydot(:) !! their rates
          logical, intent(out) :: ok      !! false: not finite, or a factorization failed
       end subroutine rhs_interface
 
-      !> Exact Jacobian df/dy.
+      !> Exact Jacobian df/dy of the controlled states.
       subroutine jacobian_interface(self, t, y, jac, ok)
          import :: ode_system, wp
          implicit none (type, external)
          class(ode_system), intent(inout) :: self
          real(wp), intent(in) :: t         !! time [s]
-         real(wp), contiguous, intent(in) :: y(:)      !! states (n_states)
-         real(wp), contiguous, intent(out) :: jac(:, :) !! df_i/dy_j (n_states, n_states)
+         real(wp), contiguous, intent(in) :: y(:)      !! states (n_controlled or more)
+         real(wp), contiguous, intent(out) :: jac(:, :) !! df_i/dy_j (n_controlled, n_controlled)
          logical, intent(out) :: ok        !! false: it could not be formed
       end subroutine jacobian_interface
    end interface
@@ -120,29 +116,66 @@ contains
       values = 1.0_wp
    end subroutine event_functions
 
-   !> Factor 1 - gamma df/dy. Nothing depends on the quadratures; their rows are left out, so that a system with them is
-   !> solved to the last bit as one without. Their own correction is within the tolerance of the iteration.
+   !> Rates of the quadratures alone. A system that has cheaper means than its right-hand side overrides this.
+   subroutine quadratures(self, t, y, rate, ok)
+      class(ode_system), intent(inout) :: self
+      real(wp), intent(in) :: t                !! [s]
+      real(wp), contiguous, intent(in) :: y(:) !! states (n_controlled)
+      real(wp), intent(out) :: rate(:)         !! (n_states - n_controlled)
+      logical, intent(out) :: ok
+      real(wp) :: ydot(self%n_states), all_of_y(self%n_states)
+
+      all_of_y = 0.0_wp
+      all_of_y(:self%n_controlled) = y
+      call self%rhs(t, all_of_y, ydot, ok)
+      rate = ydot(self%n_controlled + 1:)
+   end subroutine quadratures
+
+   !> Before a run: nothing has been summed up yet.
+   subroutine begin_quadratures(self, base)
+      class(ode_system), intent(inout) :: self
+      real(wp), intent(in) :: base !! what they are compared with beside themselves, >= 0
+      self%quadrature_base = base
+      self%quadrature_scale = 0.0_wp
+      self%quadrature_error = spread(0.0_wp, 1, self%n_states - self%n_controlled)
+   end subroutine begin_quadratures
+
+   !> The error that a step to these values may make; 0: none is known.
+   pure real(wp) function quadrature_tolerance(self, rtol, values) result(tolerance)
+      class(ode_system), intent(in) :: self
+      real(wp), intent(in) :: rtol
+      real(wp), intent(in) :: values(:) !! (n_states - n_controlled)
+      tolerance = rtol*max(self%quadrature_scale, self%quadrature_base + sum(abs(values)))
+   end function quadrature_tolerance
+
+   !> A step to these values is done, with so much of an error.
+   subroutine note_quadratures(self, values, error)
+      class(ode_system), intent(inout) :: self
+      real(wp), intent(in) :: values(:), error(:) !! (n_states - n_controlled)
+      if (.not. allocated(self%quadrature_error)) call self%begin_quadratures(self%quadrature_base)
+      self%quadrature_scale = max(self%quadrature_scale, self%quadrature_base + sum(abs(values)))
+      self%quadrature_error(:) = self%quadrature_error + error
+   end subroutine note_quadratures
+
+   !> Factor 1 - gamma df/dy.
    subroutine factorise_dense(self, t, y, gamma, fresh, ok)
       class(ode_system), intent(inout) :: self
       real(wp), intent(in) :: t                !! time [s]
-      real(wp), contiguous, intent(in) :: y(:) !! states (n_states)
+      real(wp), contiguous, intent(in) :: y(:) !! states (n_controlled)
       real(wp), intent(in) :: gamma            !! > 0 [s]
       logical, intent(in) :: fresh             !! linearise at (t, y); else the last linearisation will do
       logical, intent(out) :: ok               !! false: no Jacobian here, or the matrix is singular
 
       ok = .true.
-      call self%dense%reserve(self%n_states)
-      if (fresh) then
-         call self%jacobian(t, y, self%dense%jacobian, ok)
-         self%dense%jacobian(self%n_controlled + 1:, :) = 0.0_wp
-      end if
+      call self%dense%reserve(self%n_controlled)
+      if (fresh) call self%jacobian(t, y, self%dense%jacobian, ok)
       if (ok) call self%dense%factorise(gamma, ok)
    end subroutine factorise_dense
 
    !> x <- (1 - gamma df/dy)^-1 x.
    subroutine solve_dense(self, x)
       class(ode_system), intent(inout) :: self
-      real(wp), contiguous, intent(inout) :: x(:) !! (n_states)
+      real(wp), contiguous, intent(inout) :: x(:) !! (n_controlled)
       call self%dense%solve(x)
    end subroutine solve_dense
 

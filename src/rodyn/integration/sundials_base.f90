@@ -18,6 +18,8 @@ module rodyn_sundials_base
       real(wp) :: rtol = 0.0_wp
       real(wp) :: atol = 0.0_wp
       integer(i8) :: n_rhs = 0       !! calls of the right-hand side
+      real(wp), allocatable :: recent(:, :) !! rates of the quadratures in the last calls, in turn, if somebody wants them
+      integer :: latest = 0          !! column of the last call
       logical :: refused = .false.   !! the last call said ok = .false.
       logical :: not_finite = .false. !! the last call gave NaN or infinity
       real(wp) :: t_refused = 0.0_wp !! time of the last bad call [s]
@@ -68,6 +70,10 @@ contains
       rates => content_of(ydot)
       data%n_rhs = data%n_rhs + 1
       call data%system%rhs(t, states%values, rates%values, ok)
+      if (allocated(data%recent)) then
+         data%latest = modulo(data%latest, size(data%recent, 2)) + 1
+         data%recent(:, data%latest) = rates%values(data%system%n_controlled + 1:)
+      end if
       flag = 0_c_int
       if (ok) then
          if (all_finite(rates%values)) return

@@ -95,6 +95,8 @@ module rodyn_run_file
       integer(i8) :: n_nonlinear_failures = 0_i8
       integer(i8) :: n_error_test_failures = 0_i8
       integer(i8) :: n_restarts = 0_i8            !! at switches of loads
+      real(wp) :: work_external_error = 0.0_wp     !! estimated, at the end of the run [J]; with the ledger
+      real(wp) :: energy_dissipated_error = 0.0_wp !! likewise [J]
       real(wp) :: wall_seconds = 0.0_wp
       character(len=:), allocatable :: warnings   !! where the model does not hold, one line each; a root attribute
    end type solver_report
@@ -470,6 +472,10 @@ contains
       call put_count('n_nonlinear_failures', report%n_nonlinear_failures)
       call put_count('n_error_test_failures', report%n_error_test_failures)
       call put_count('n_restarts', report%n_restarts)
+      if (self%ledger) then
+         call put_real('work_external_error', report%work_external_error)
+         call put_real('energy_dissipated_error', report%energy_dissipated_error)
+      end if
       call put_real('wall_seconds', report%wall_seconds)
 
    contains

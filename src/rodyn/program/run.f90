@@ -124,7 +124,7 @@ contains
       if (earlier) call recorder%file%discard()
       if (motion%events%watches .and. .not. (earlier .or. allocated(error))) call write_events(recorder%file, motion, error)
       if (.not. (earlier .or. allocated(error))) &
-         call close_file(recorder, driver, config, scene, failure, &
+         call close_file(recorder, driver, motion, config, failure, &
                       real(clock_end - clock_start, wp)/real(clock_rate, wp), error)
       if (.not. silent .and. .not. allocated(error)) call print_events(motion)
       if (.not. silent .and. .not. allocated(error)) &
@@ -193,11 +193,11 @@ contains
    end function options_of
 
    !> Attributes of the solver, status, and the final name.
-   subroutine close_file(recorder, driver, config, scene, failure, seconds, error)
+   subroutine close_file(recorder, driver, motion, config, failure, seconds, error)
       type(recorder_type), intent(inout) :: recorder
       type(driver_type), intent(inout) :: driver
+      type(motion_type), intent(in) :: motion
       type(case_config), intent(in) :: config
-      type(scene_type), intent(in) :: scene
       type(error_type), allocatable, intent(in) :: failure
       real(wp), intent(in) :: seconds
       type(error_type), allocatable, intent(out) :: error
@@ -207,7 +207,7 @@ contains
       stats = driver%statistics()
       report%method = driver%methods()
       report%reason = driver%reason()
-      report%kernel = trim(merge('assembled', 'recursive', scene%assembled))
+      report%kernel = trim(merge('assembled', 'recursive', motion%dynamics%scene%assembled))
       report%order = config%solver%order
       report%rtol = config%solver%rtol
       report%atol = config%solver%atol
@@ -220,6 +220,10 @@ contains
       report%n_nonlinear_failures = stats%n_nonlinear_failures
       report%n_error_test_failures = stats%n_error_test_failures
       report%n_restarts = max(0_i8, stats%n_starts - 1_i8)
+      if (allocated(motion%quadrature_error)) then
+         report%work_external_error = motion%quadrature_error(1)
+         report%energy_dissipated_error = motion%quadrature_error(2)
+      end if
       report%wall_seconds = seconds
       report%warnings = recorder%validity%warnings()
       if (.not. allocated(failure)) then

@@ -1,0 +1,165 @@
+!> Work and dissipated energy, against values by hand, for every method and tolerance.
+module test_ledger
+   use rodyn_kinds, only: wp
+   use rodyn_errors, only: error_type
+   use rodyn_case_config, only: case_config, hinge_config, kink_config, load_config
+   use test_testing, only: unittest, new_test, check
+   use test_random_scenes, only: allocate_case
+   use test_trajectories, only: trajectory, integrate
+   implicit none (type, external)
+   private
+   public :: collect_ledger
+
+   character(len=6), parameter :: methods(5) = [character(len=6) :: 'adams', 'bdf', 'erk', 'dop853', 'gauss']
+   real(wp), parameter :: bound(5) = [50.0_wp, 500.0_wp, 50.0_wp, 50.0_wp, 50.0_wp] !! of errors, in rtol times the energy of the run
+
+contains
+
+   subroutine collect_ledger(suite)
+      type(unittest), allocatable, intent(out) :: suite(:)
+      suite = [new_test('a damper takes what a fast kink costs', test_fast_kink), &
+               new_test('dampers take all the energy of a free decay', test_decay), &
+               new_test('work of a load is the kinetic energy of a free body', test_free_body), &
+               new_test('a hinge that is held passes the work of its kink', test_held_kink)]
+   end subroutine collect_ledger
+
+   !> One rigid rod on a fixed spacecraft, of length 1.
+   subroutine one_rod(config, node_mass, stiffness, damping)
+      type(case_config), intent(out) :: config
+      real(wp), intent(in) :: node_mass, stiffness, damping
+      call allocate_case(config, 1)
+      config%spacecraft%motion = 'fixed'
+      config%model%bending = 'rigid'
+      config%chain%length = 1.0_wp
+      config%chain%mass_per_length = 1.0_wp
+      config%chain%node_mass = node_mass
+      config%chain%hinge_stiffness = stiffness
+      config%chain%hinge_damping = damping
+      config%chain%kink = 0.0_wp
+   end subroutine one_rod
+
+   !> Run a case to t_end by every method at rtol = 1e-4 ... 1e-12 and compare the sums at its end.
+   subroutine compare(config, t_end, work, dissipated, scale, error)
+      type(case_config), intent(inout) :: config
+      real(wp), intent(in) :: t_end, work, dissipated !! [s], [J]
+      real(wp), intent(in) :: scale                   !! energy of the run [J]
+      type(error_type), allocatable, intent(out) :: error
+      type(trajectory) :: motion
+      character(len=100) :: text
+      real(wp) :: off
+      integer :: i, digits
+
+      do i = 1, size(methods)
+         do digits = 4, 12, 2
+            config%solver%method = methods(i)
+            config%solver%rtol = 10.0_wp**(-digits)
+            config%solver%atol = 1.0e-2_wp*config%solver%rtol
+            call integrate(config, [0.0_wp, 0.37_wp*t_end, t_end], motion, error)
+            if (allocated(error)) return
+            off = max(abs(motion%rows(3)%work_external - work), abs(motion%rows(3)%energy_dissipated - dissipated))/scale
+            write (text, '(a, " at rtol = 1e-", i0, ": off by", es9.1, " of the energy")') trim(methods(i)), digits, off
+            call check(error, off <= bound(i)*config%solver%rtol + 1.0e-13_wp, trim(text))
+            if (allocated(error)) return
+         end do
+      end do
+   end subroutine compare
+
+   !> A kink that moves by 0.1 rad within 0.2 ms against a strong damper and a heavy node. The reference: the equation of the
+   !> rod by many steps of the classical Runge-Kutta method.
+   subroutine test_fast_kink(error)
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), parameter :: duration = 2.0e-4_wp, change = 0.1_wp, stiffness = 100.0_wp, damping = 2.0_wp, mass = 1000.0_wp
+      type(case_config) :: config
+      real(wp) :: y(4) ! phi, phi', work, dissipated
+
+      call one_rod(config, mass, stiffness, damping)
+      config%kink_programs = [kink_config(hinge=0, law='smooth_step', t_start=1.0e-4_wp, t_end=1.0e-4_wp + duration, value=change)]
+      y = 0.0_wp
+      call follow(0.0_wp, duration, y)
+      call follow(duration, 1.0e-3_wp - 1.0e-4_wp, y)
+      ! By hand, if the rod stood still: 10/7 D change^2/duration.
+      call check(error, abs(y(4) - 10.0_wp/7.0_wp*damping*change**2/duration) < 1.0e-6_wp*y(4), 'the reference is off')
+      if (.not. allocated(error)) call compare(config, 1.0e-3_wp, y(3), y(4), y(4), error)
+
+   contains
+
+      subroutine follow(from, to, state)
+         real(wp), intent(in) :: from, to
+         real(wp), intent(inout) :: state(4)
+         integer, parameter :: n = 2000
+         real(wp) :: h, t, k1(4), k2(4), k3(4), k4(4)
+         integer :: i
+         h = (to - from)/n
+         do i = 0, n - 1
+            t = from + i*h
+            k1 = rates(t, state)
+            k2 = rates(t + 0.5_wp*h, state + 0.5_wp*h*k1)
+            k3 = rates(t + 0.5_wp*h, state + 0.5_wp*h*k2)
+            k4 = rates(t + h, state + h*k3)
+            state = state + h/6.0_wp*(k1 + 2.0_wp*(k2 + k3) + k4)
+         end do
+      end subroutine follow
+
+      pure function rates(t, state) result(rate)
+         real(wp), intent(in) :: t, state(4)
+         real(wp) :: rate(4), x, kink, kink_rate, moment
+         x = min(t/duration, 1.0_wp)
+         kink = change*x**3*(10.0_wp + x*(6.0_wp*x - 15.0_wp))
+         kink_rate = change/duration*30.0_wp*(x*(1.0_wp - x))**2
+         moment = stiffness*(state(1) - kink) + damping*(state(2) - kink_rate)
+         rate = [state(2), -moment/(mass + 1.0_wp/3.0_wp), -moment*kink_rate, damping*(state(2) - kink_rate)**2]
+      end function rates
+
+   end subroutine test_fast_kink
+
+   !> All of the kinetic energy at the start ends in the damper: 60 times its time constant.
+   subroutine test_decay(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+      real(wp), parameter :: inertia = 2.0_wp + 1.0_wp/3.0_wp, rate = 0.8_wp
+
+      call one_rod(config, 2.0_wp, 210.0_wp, 14.0_wp) ! 9.5 rad/s, damping ratio 0.32
+      config%initial%phi_rate = rate
+      call compare(config, 20.0_wp, 0.0_wp, 0.5_wp*inertia*rate**2, 0.5_wp*inertia*rate**2, error)
+   end subroutine test_decay
+
+   !> A force along a straight chain turns nothing: W = I^2/(2 m), I its impulse.
+   subroutine test_free_body(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+      real(wp), parameter :: force = 30.0_wp, rate = 7.0_wp, t_end = 3.0_wp
+      real(wp) :: work
+      integer :: which
+
+      do which = 1, 2
+         call one_rod(config, 3.0_wp, 50.0_wp, 1.0_wp)
+         config%spacecraft%motion = 'free'
+         config%spacecraft%mass = 20.0_wp
+         config%spacecraft%inertia = 5.0_wp
+         config%loads = [load_config(target='spacecraft', component='X', law='constant', value=-force)]
+         work = (force*t_end)**2/(2.0_wp*24.0_wp)
+         if (which == 2) then
+            config%loads(1)%law = 'sine_squared'
+            config%loads(1)%rate = rate
+            work = (force*(0.5_wp*t_end - sin(2.0_wp*rate*t_end)/(4.0_wp*rate)))**2/(2.0_wp*24.0_wp)
+         end if
+         call compare(config, t_end, work, 0.0_wp, work, error)
+         if (allocated(error)) return
+      end do
+   end subroutine test_free_body
+
+   !> A rod that is held in its hinge follows the kink: the drive's work is its kinetic energy.
+   subroutine test_held_kink(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+      real(wp), parameter :: change = 0.6_wp, duration = 0.5_wp, t_end = 0.2_wp, inertia = 2.0_wp + 1.0_wp/3.0_wp
+      real(wp), parameter :: x = t_end/duration
+      real(wp), parameter :: energy = 0.5_wp*inertia*(change/duration*30.0_wp*(x*(1.0_wp - x))**2)**2
+
+      call one_rod(config, 2.0_wp, 10.0_wp, 1.0_wp)
+      config%hinges = [hinge_config(hinge=0, held=.true.)]
+      config%kink_programs = [kink_config(hinge=0, law='smooth_step', t_start=0.0_wp, t_end=duration, value=change)]
+      call compare(config, t_end, energy, 0.0_wp, energy, error)
+   end subroutine test_held_kink
+
+end module test_ledger
