@@ -7,6 +7,7 @@ import pytest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "postproc"))
+sys.path.insert(1, str(ROOT / "bench" / "stability"))
 
 import result_files  # noqa: E402
 

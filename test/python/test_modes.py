@@ -7,6 +7,7 @@ import pathlib
 import subprocess
 import sys
 
+import equilibria
 import mode_shapes
 import numpy as np
 import pytest
@@ -210,3 +211,63 @@ def test_bubbles_of_modes_are_drawn(tmp_path):
     at_quarter, at_middle = ((curve[i] - start) @ across for i in (5, 10))
     assert abs(bubble) > 0.1 * abs(middle)
     assert np.isclose(at_quarter / at_middle, quarter / middle, rtol=1e-9)
+
+
+SPINNING = (
+    "&spacecraft mass = {mass}, inertia = {mass} /\n&chain n_rods = 8, length = 0.125, mass_per_length = 1, hinge_stiffness = 0 /\n"
+    "&model bending = 'rigid' /\n&initial omega = 3 /\n"
+)
+
+
+@pytest.mark.parametrize(("mass", "options"), [(10, []), (1e6, []), (1e6, ["--equilibrium"])])
+def test_a_spinning_chain_of_free_links_is_neutral(mass, options, tmp_path):
+    """Its first two eigenvalues are a zero of one motion, which rounding makes +-3e-8; then sqrt(k (2 k - 1) - 1) times the spin."""
+    data = modes_of(tmp_path, SPINNING.format(mass=mass), *options)
+    assert data.attrs["stable"] == 1 and data.attrs["steady"] == 1
+    kinds = list(data.kind.values)
+    assert kinds == ["rigid body"] * 3 + ["mechanism"] + ["oscillation"] * 7
+    if mass > 10:  # n links are off by some n^-2
+        np.testing.assert_allclose(data.frequency[4:6], [3 * 5**0.5, 3 * 14**0.5], rtol=0.05)
+
+
+def test_an_equilibrium_is_written_with_all_of_it(tmp_path):
+    """Three rods, one hinge held, a force at the end: angles of all rods, moments by statics."""
+    data = modes_of(
+        tmp_path,
+        "&spacecraft motion = 'fixed', hinge_x = 0.2 /\n&chain n_rods = 3, length = 1.2, 0.8, 0.7, mass_per_length = 2, "
+        "bending_stiffness = 500, hinge_stiffness = 100, hinge_damping = 0.1 /\n&model formulation = 'consistent' /\n"
+        "&initial phi = 0, 0.3, 0.3 /\n&hinge hinge = 1, held = .true. /\n"
+        "&load target = 'node', node = 3, component = 'Y', value = 7 /\n"
+        "&load target = 'node', node = 2, component = 'X', value = -4 /\n",
+        "--equilibrium",
+    )
+    assert "phi_2" not in data.coordinate.values and list(data.hinge.values) == [0, 1, 2]
+    phi, length = data.state_phi.values, np.array([1.2, 0.8, 0.7])
+    node = np.cumsum(length * np.exp(1j * phi))
+    force = np.array([0, -4, 7j])
+    hinge = np.concatenate([[0], node[:-1]])
+    moment = [sum((np.conj(node[j] - hinge[k]) * force[j]).imag for j in range(k, 3)) for k in range(3)]
+    np.testing.assert_allclose(data.state_hinge_moment, moment, rtol=1e-9, atol=1e-9)
+    angle = data.state_hinge_angle.values
+    np.testing.assert_allclose(angle[[0, 2]] * 100, np.array(moment)[[0, 2]], rtol=1e-9)
+    assert angle[1] == pytest.approx(0.3, abs=1e-12)
+    opening = np.diff(phi, prepend=0) + data.state_alpha.values - np.concatenate([[0], data.state_beta.values[:-1]])
+    np.testing.assert_allclose(angle, opening, atol=1e-12)
+
+
+def test_equilibria_of_random_chains_with_freeplay_and_stops_are_found(tmp_path):
+    """Against an independent potential energy."""
+    faults = {seed: equilibria.fault_of(equilibria.Scene(np.random.default_rng(seed)), tmp_path) for seed in range(1001, 1121)}
+    assert not any(faults.values()), {seed: fault for seed, fault in faults.items() if fault}
+
+
+def test_freeplay_and_a_stop_in_one_hinge_do_not_lead_in_a_circle(tmp_path):
+    text = (
+        "&spacecraft motion = 'fixed' /\n&chain n_rods = 4, length = 1.25, mass_per_length = 1.52, node_mass = 0.581, "
+        "hinge_stiffness = 774, 989, 658, 253, hinge_damping = 3.92, 0.128, 1.32, 0.106, kink = -0.00824, 0.177, 0, 0 /\n"
+        "&model inertia = 'lumped', bending = 'rigid' /\n&initial phi = -0.277, 0.232, -0.0637, 0.241 /\n"
+        "&load target = 'node', node = 4, component = 'X', value = -14.7 /\n"
+        "&hinge hinge = 2, freeplay = 0.0957, upper_stop = 0.023, stop_stiffness = 4680 /\n"
+    )
+    data = modes_of(tmp_path, text, "--equilibrium")
+    assert data.attrs["stable"] == 1

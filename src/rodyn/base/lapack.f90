@@ -7,7 +7,7 @@ module rodyn_lapack
    implicit none (type, external)
    private
    public :: use_one_thread, symmetric_eigenvalues
-   public :: dpotrf, dpotrs, dpstrf, dgesv, dgetrf, dgetrs, dsyev, dsyevd, dgeev, dgemv, dgemm, dtrsm
+   public :: dpotrf, dpotrs, dpstrf, dgesv, dgetrf, dgetrs, dsyev, dsyevd, dgeev, dgeevx, dgemv, dgemm, dtrsm
 
    interface
       !> Cholesky factors of a symmetric positive definite matrix.
@@ -135,6 +135,20 @@ module rodyn_lapack
          real(wp), intent(inout) :: work(*)
          integer, intent(out) :: info
       end subroutine dgeev
+
+      !> The same with the condition of each eigenvalue: |left . right| of its unit vectors, as the balanced matrix has them.
+      pure subroutine dgeevx(balanc, jobvl, jobvr, sense, n, a, lda, wr, wi, vl, ldvl, vr, ldvr, ilo, ihi, scale, abnrm, &
+                             rconde, rcondv, work, lwork, iwork, info)
+         import :: wp
+         implicit none (type, external)
+         character(len=1), intent(in) :: balanc, jobvl, jobvr, sense
+         integer, intent(in) :: n, lda, ldvl, ldvr, lwork
+         real(wp), intent(inout) :: a(lda, *), vl(ldvl, *), vr(ldvr, *), work(*)
+         real(wp), intent(out) :: wr(*), wi(*), scale(*), abnrm
+         real(wp), intent(inout) :: rconde(*), rcondv(*)
+         integer, intent(out) :: ilo, ihi, info
+         integer, intent(inout) :: iwork(*)
+      end subroutine dgeevx
 
       !> y <- alpha A x + beta y.
       pure subroutine dgemv(trans, m, n, alpha, a, lda, x, incx, beta, y, incy)

@@ -31,6 +31,7 @@ module rodyn_equilibrium
    real(wp), parameter :: close_enough = 1.0e-9_wp !! the step after one so short is at rounding level [rad]
    integer, parameter :: most_creeping_steps = 400
    real(wp), parameter :: creeping_step = 0.1_wp   !! largest change of an angle in one of them [rad]
+   real(wp), parameter :: light_drag = 1.0e-6_wp   !! times the square of the fastest rate
 
    !> What the chain lacks at a state, and LU factors of its derivative there or at a state before; both without angles
    !> that locks make redundant.
@@ -41,6 +42,9 @@ module rodyn_equilibrium
       real(wp), allocatable :: lacking(:)      !! r of these coordinates, th' of these hinges
       real(wp), allocatable :: acceleration(:) !! (a_b, 0) (n_dof)
       real(wp), allocatable :: carried(:, :)   !! M_cb M_bb^-1 (n_dof, n_base)
+      real(wp), allocatable :: weight(:)       !! of each, to make work of it along a step
+      real(wp), allocatable :: step(:)         !! of these coordinates and hinges
+      real(wp) :: fastest = 0.0_wp             !! largest ratio of stiffness and mass on the diagonals [1/s^2]
       real(wp), allocatable :: lu(:, :), scale(:)
       integer, allocatable :: pivots(:)
    end type newton_solver
@@ -53,29 +57,8 @@ contains
       real(wp), intent(in) :: t                    !! [s]; the loads are those of `motion%dynamics%set_regime`
       real(wp), contiguous, intent(inout) :: y(:)  !! (q, p, ...)
       type(error_type), allocatable, intent(out) :: error
-      logical :: changed
-      integer :: pass
-
-      do pass = 1, most_passes
-         call find_with_laws(motion, t, y, error)
-         if (allocated(error) .or. .not. motion%events%watches) return
-         associate (r => motion%n_q, m => motion%n_dof)
-            call motion%events%adopt(motion%dynamics, t, y(1:r), y(r + 1:r + m), changed, error)
-         end associate
-         if (allocated(error) .or. .not. changed) return
-      end do
-      call raise(error, 'no equilibrium was found: laws of hinges (stops, freeplay) follow each other without end')
-   end subroutine find_equilibrium
-
-   !> The same with the laws that hinges have now.
-   subroutine find_with_laws(motion, t, y, error)
-      type(motion_type), intent(inout) :: motion
-      real(wp), intent(in) :: t                    !! [s]
-      real(wp), contiguous, intent(inout) :: y(:)  !! (q, p, ...)
-      type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: start(:)
       type(newton_solver) :: solver
-      logical :: ok
+      real(wp), allocatable :: start(:)
 
       if (motion%dynamics%varying) then
          call raise(error, 'no equilibrium: a load or a kink varies in time')
@@ -86,23 +69,59 @@ contains
       associate (b => motion%dynamics%scene%n_base, r => motion%n_q, m => motion%n_dof)
          y(r + b + 1:r + m) = 0.0_wp
          start = y(b + 1:r)
-         call iterate(solver, motion, t, y, ok, error)
-         if (.not. (ok .or. allocated(error))) then
+         call find_with_laws(solver, motion, t, y, error)
+         if (allocated(error)) then
             y(b + 1:r) = start
             call creep(solver, motion, t, y)
-            call iterate(solver, motion, t, y, ok, error)
+            call find_with_laws(solver, motion, t, y, error)
          end if
+         if (allocated(error)) return
+         if (motion%events%watches) call motion%events%check_latches(motion%dynamics, t, y(1:r), y(r + 1:r + m), error)
+         if (b > 0 .and. .not. allocated(error)) call check_spin(motion, t, y, error)
+      end associate
+   end subroutine find_equilibrium
+
+   !> By Newton's method with the laws that hinges have now, and again with those that hold where it has led, until these stay
+   !> the same, or the state does although they change: on the border of two.
+   subroutine find_with_laws(solver, motion, t, y, error)
+      type(newton_solver), intent(inout) :: solver
+      type(motion_type), intent(inout) :: motion
+      real(wp), intent(in) :: t
+      real(wp), contiguous, intent(inout) :: y(:)
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: before(:)
+      logical :: ok
+      integer :: pass
+
+      do pass = 1, most_passes
+         before = y
+         call iterate(solver, motion, t, y, ok, error)
          if (allocated(error)) return
          if (.not. ok) then
             call raise(error, "no equilibrium was found near the initial state: neither Newton's method nor a slow motion "// &
                        'leads to one from there')
             return
          end if
-         if (b > 0) call check_spin(motion, t, y, error)
-      end associate
+         if (.not. laws_change(motion, t, y)) return
+         if (maxval(abs(y - before)) <= close_enough) return
+      end do
+      call raise(error, 'no equilibrium was found: laws of hinges (stops, freeplay) follow each other without end')
    end subroutine find_with_laws
 
-   !> Newton's method from a state. Not `ok`: it does not converge.
+   !> Let the hinges take the laws that hold at a state. Do these differ from those they had?
+   logical function laws_change(motion, t, y)
+      type(motion_type), intent(inout) :: motion
+      real(wp), intent(in) :: t
+      real(wp), intent(in) :: y(:)
+      laws_change = .false.
+      if (.not. motion%events%watches) return
+      associate (r => motion%n_q, m => motion%n_dof)
+         call motion%events%adopt(motion%dynamics, t, y(1:r), y(r + 1:r + m), laws_change)
+      end associate
+   end function laws_change
+
+   !> Newton's method from a state. Not `ok`: it does not converge. Where the stiffness is singular, the state may be one of
+   !> many equilibria that lie along a line: a little drag tells whether the forces are zero to rounding.
    subroutine iterate(solver, motion, t, y, ok, error)
       type(newton_solver), intent(inout) :: solver
       type(motion_type), intent(inout) :: motion
@@ -112,6 +131,7 @@ contains
       type(error_type), allocatable, intent(out) :: error !! the stiffness is singular
       real(wp), allocatable :: x(:), step(:), next(:)
       real(wp) :: share
+      logical :: singular
       integer :: i
 
       associate (b => motion%dynamics%scene%n_base, r => motion%n_q)
@@ -119,11 +139,12 @@ contains
          if (.not. ok) return
          do i = 1, most_steps
             call factorise(solver, motion, y, 0.0_wp, ok)
-            if (.not. ok) then
+            singular = .not. ok
+            if (singular) call factorise(solver, motion, y, light_drag*solver%fastest, ok)
+            if (ok) call newton_step(solver, motion, step, ok)
+            if (ok .and. singular) ok = maxval(abs(step)) <= close_enough
+            if (singular .and. .not. ok) &
                call raise(error, 'no equilibrium: the stiffness is singular (a hinge without spring?)')
-               return
-            end if
-            call newton_step(solver, motion, step, ok)
             if (.not. ok) return
             x = y(b + 1:r)
             if (maxval(abs(step)) <= close_enough) then
@@ -145,31 +166,37 @@ contains
       ok = .false.
    end subroutine iterate
 
-   !> Where Newton's path ends at a singular stiffness: the motion M q' = h of the chain in a viscous medium leads past it, to
-   !> an equilibrium that is stable there. Implicit steps of Euler's method, linearised, whose length follows from how far they go
-   !> (pseudo-transient continuation, Kelley & Keyes, SIAM J. Numer. Anal. 35, 1998, 508).
+   !> Where Newton's path ends at a singular stiffness, or laws of hinges lead it in a circle: the motion M q' = h of the chain
+   !> in a viscous medium leads past it, to an equilibrium that is stable there. Implicit steps of Euler's method, linearised with
+   !> the laws that hold at their start, whose length follows from how far they go (pseudo-transient continuation, Kelley & Keyes,
+   !> SIAM J. Numer. Anal. 35, 1998, 508). Forces must do work in each, by the trapezoidal rule, so that none comes back.
    subroutine creep(solver, motion, t, y)
       type(newton_solver), intent(inout) :: solver
       type(motion_type), intent(inout) :: motion
       real(wp), intent(in) :: t
       real(wp), contiguous, intent(inout) :: y(:)
-      real(wp), allocatable :: x(:), step(:)
+      real(wp), allocatable :: x(:), step(:), before(:)
       real(wp) :: drag !! the inverse of the step in time [1/s^2]
-      logical :: ok
+      logical :: ok, changed
       integer :: i, short
 
       drag = 1.0_wp
       short = 0
       associate (b => motion%dynamics%scene%n_base, r => motion%n_q)
          x = y(b + 1:r)
+         changed = laws_change(motion, t, y)
          call find_lacking(solver, motion, t, y, ok)
          do i = 1, most_creeping_steps
             if (ok) call factorise(solver, motion, y, drag, ok)
             if (ok) call newton_step(solver, motion, step, ok)
             if (ok) ok = maxval(abs(step)) <= creeping_step
             if (ok) then
+               before = solver%lacking
                y(b + 1:r) = x + step
+               changed = laws_change(motion, t, y)
                call find_lacking(solver, motion, t, y, ok)
+               if (ok .and. maxval(abs(step)) > close_enough) &
+                  ok = sum(solver%weight*solver%step*(before + solver%lacking)) >= 0.0_wp
             end if
             if (ok) then
                x = y(b + 1:r)
@@ -179,6 +206,7 @@ contains
             else
                drag = 4.0_wp*drag
                y(b + 1:r) = x
+               changed = laws_change(motion, t, y)
                call find_lacking(solver, motion, t, y, ok)
             end if
          end do
@@ -203,6 +231,7 @@ contains
          associate (n => size(solver%kept))
             allocate (solver%lacking(n), solver%acceleration(m), solver%carried(m, b), solver%pivots(n))
          end associate
+         solver%weight = [spread(1.0_wp, 1, size(free) - b), scene%hinges%damping(scene%hinges%relaxing(solver%joints))]
       end associate
    end subroutine new_newton_solver
 
@@ -277,6 +306,10 @@ contains
          end if
       end associate
       n = size(solver%lacking)
+      solver%fastest = 0.0_wp
+      do i = 1, size(solver%chain)
+         solver%fastest = max(solver%fastest, abs(solver%lu(i, i))/motion%system%m(solver%chain(i), solver%chain(i)))
+      end do
       solver%scale = maxval(abs(solver%lu), dim=2)
       ok = all(solver%scale > 0.0_wp)
       if (.not. ok .or. n == 0) return ! every hinge of a rigid chain is locked
@@ -290,7 +323,7 @@ contains
 
    !> The step of the chain by the factors at hand, and what follows from it by locks.
    subroutine newton_step(solver, motion, step, ok)
-      type(newton_solver), intent(in) :: solver
+      type(newton_solver), intent(inout) :: solver
       type(motion_type), intent(in) :: motion
       real(wp), allocatable, intent(out) :: step(:)
       logical, intent(out) :: ok
@@ -303,6 +336,7 @@ contains
          step = solver%lacking/solver%scale
          if (n > 0) call dgetrs('N', n, 1, solver%lu, n, solver%pivots, step, n, info)
          if (n > 0) ok = info == 0 .and. all(abs(step) <= huge(step))
+         solver%step = step
          whole = 0.0_wp
          whole(solver%kept) = step
          still = 0.0_wp

@@ -53,6 +53,7 @@ module rodyn_hinge_events
       procedure :: margins
       procedure :: begin
       procedure :: adopt
+      procedure :: check_latches
       procedure :: respond
       procedure :: release_due
       procedure :: follow
@@ -232,13 +233,12 @@ contains
       end associate
    end subroutine rest_joints
 
-   !> Choose the laws anew at a state to which no motion led; what is locked stays so. An equilibrium beyond a latch is none.
-   subroutine adopt(self, dynamics, t, q, p, changed, error)
+   !> Choose the laws anew at a state to which no motion led; what is locked stays so.
+   subroutine adopt(self, dynamics, t, q, p, changed)
       class(event_set), intent(inout) :: self
       type(dynamics_type), intent(inout) :: dynamics
       real(wp), intent(in) :: t, q(:), p(:)
       logical, intent(out) :: changed !! some hinge has another law
-      type(error_type), allocatable, intent(out) :: error
       real(wp), dimension(0:dynamics%scene%n - 1) :: stiffness, constant ! of T = C th + constant at rest
       integer :: i
 
@@ -248,18 +248,30 @@ contains
       do i = 1, size(dynamics%scene%hinges%mechanisms)
          associate (mechanism => dynamics%scene%hinges%mechanisms(i))
             if (mechanism%is_constrained()) cycle
-            associate (theta => self%theta(mechanism%hinge), rate => self%theta_rate(mechanism%hinge))
-               call mechanism%settle(theta, rate)
-               if (mechanism%margin(part_latch, t, theta, rate) < 0.0_wp) call raise(error, &
-                  'no equilibrium: hinge '//to_text(mechanism%hinge)//' latches before the chain comes to rest')
-            end associate
+            call mechanism%settle(self%theta(mechanism%hinge), self%theta_rate(mechanism%hinge))
          end associate
-         if (allocated(error)) return
       end do
-      call dynamics%change_hinges(error)
+      call dynamics%change_hinges()
       changed = any(abs(stiffness - dynamics%scene%hinges%stiffness) > 0.0_wp) .or. &
                 any(abs(constant - (dynamics%scene%hinges%constant + dynamics%scene%hinges%friction)) > 0.0_wp)
    end subroutine adopt
+
+   !> Refuse a state beyond a latch, to which no motion leads.
+   subroutine check_latches(self, dynamics, t, q, p, error)
+      class(event_set), intent(inout) :: self
+      type(dynamics_type), intent(inout) :: dynamics
+      real(wp), intent(in) :: t, q(:), p(:)
+      type(error_type), allocatable, intent(out) :: error
+      integer :: i
+
+      call find_joints(self, dynamics, t, q, p)
+      do i = 1, self%n
+         if (self%part(i) /= part_latch .or. margin_of(self, dynamics, i, t) >= 0.0_wp) cycle
+         call raise(error, 'no equilibrium: hinge '//to_text(dynamics%scene%hinges%mechanisms(self%mechanism(i))%hinge)// &
+                    ' latches before the chain comes to rest')
+         return
+      end do
+   end subroutine check_latches
 
    !> Change the laws whose margins became negative. The rates p change if a hinge becomes a constraint.
    subroutine respond(self, dynamics, t, q, p, crossed, lost, error)

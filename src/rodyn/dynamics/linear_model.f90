@@ -13,7 +13,7 @@ module rodyn_linear_model
    use rodyn_errors, only: error_type, raise
    use rodyn_assembled, only: new_assembled_system
    use rodyn_locks, only: has_slaves, expansion_matrix, free_coordinates
-   use rodyn_motion, only: motion_type, differentiate_balance
+   use rodyn_motion, only: motion_type, differentiate_balance, hinges_at
    implicit none (type, external)
    private
    public :: linear_model, new_linear_model
@@ -25,6 +25,7 @@ module rodyn_linear_model
       integer :: n_joints = 0                !! relaxing hinges that are not locked
       real(wp), allocatable :: q(:), p(:)    !! the state (n_q), (dof)
       real(wp), allocatable :: acceleration(:) !! p' there (dof)
+      real(wp), allocatable :: hinge_angle(:), hinge_moment(:) !! rotations of hinges 0..n-1 there [rad], moments in them [N m]
       integer, allocatable :: kept(:)          !! where the coordinates stand in q, those of relaxing hinges last (n + n_joints)
       real(wp), allocatable :: expansion(:, :) !! T (dof, n); allocated if something is redundant
       real(wp), allocatable :: mass(:, :)      !! M (n, n)
@@ -69,6 +70,7 @@ contains
                        'positive definite')
             return
          end if
+         call hinges_at(motion, t, y, model%hinge_angle, model%hinge_moment, ok)
          model%mass = motion%system%m
          model%stiffness = by_state(:, :r)
          allocate (model%damping(m, m), model%gyration(m, m), source=0.0_wp)

@@ -12,7 +12,7 @@ module rodyn_modes
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type, raise
    use rodyn_jacobi_rotation, only: jacobi_rotation, rotate_columns, rotate_rows
-   use rodyn_lapack, only: dgeev, symmetric_eigenvalues
+   use rodyn_lapack, only: dgeev, dgeevx, symmetric_eigenvalues
    use rodyn_linear_model, only: linear_model
    implicit none (type, external)
    private
@@ -21,11 +21,13 @@ module rodyn_modes
 
    !> What a mode is.
    character(len=*), parameter :: rigid_body = 'rigid body'   !! translation or rotation of the whole; eigenvalue 0
-   character(len=*), parameter :: mechanism = 'mechanism'     !! free hinges let the chain fold; eigenvalue 0
+   character(len=*), parameter :: mechanism = 'mechanism'     !! nothing holds the chain against this motion; eigenvalue 0
    character(len=*), parameter :: oscillation = 'oscillation' !! a pair of complex eigenvalues, counted once
    character(len=*), parameter :: relaxation = 'relaxation'   !! a real eigenvalue, decaying or growing
    integer, parameter :: kind_length = 11
    real(wp), parameter :: noise = 1.0e-10_wp !! growth slower than this times the fastest rate is none
+   real(wp), parameter :: slow = 1.0e-4_wp   !! times the fastest rate: what may be a zero of any kind
+   real(wp), parameter :: rounding = 1.0e1_wp*epsilon(1.0_wp) !! of matrices, relative to their norms
 
    !> Modes in the order above, each kind by rising magnitude of its eigenvalue.
    type :: mode_set
@@ -33,6 +35,7 @@ module rodyn_modes
       complex(wp), allocatable :: eigenvalue(:)  !! of oscillations the one with a positive imaginary part (n) [1/s]
       character(len=kind_length), allocatable :: kind(:) !! (n)
       complex(wp), allocatable :: shape(:, :)    !! changes of q (n_q, n): motion with kinetic energy |eigenvalue|^2/2
+      real(wp), allocatable :: uncertainty(:)    !! what rounding may have done to the eigenvalue (n) [1/s]
       real(wp) :: fastest = 0.0_wp               !! largest magnitude [1/s]
       logical :: conservative = .false.          !! no damping, no gyration, a symmetric stiffness: real shapes
    contains
@@ -82,7 +85,7 @@ contains
    elemental logical function is_stable(self, i)
       class(mode_set), intent(in) :: self
       integer, intent(in) :: i !! mode
-      is_stable = real(self%eigenvalue(i), wp) <= noise*self%fastest
+      is_stable = real(self%eigenvalue(i), wp) <= max(noise*self%fastest, self%uncertainty(i))
    end function is_stable
 
    !> Which modes oscillate, by rising frequency.
@@ -244,6 +247,7 @@ contains
       first = n_rigid + n_zero
       modes%n = first + size(eigenvalue)
       allocate (modes%eigenvalue(modes%n), source=(0.0_wp, 0.0_wp))
+      allocate (modes%uncertainty(modes%n), source=0.0_wp)
       allocate (modes%kind(modes%n))
       modes%eigenvalue(first + 1:) = eigenvalue
       modes%kind(:n_rigid) = rigid_body
@@ -285,15 +289,15 @@ contains
       logical, intent(in) :: at_rest     !! an unloaded equilibrium that does not spin
       logical, intent(in) :: with_shapes
       type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: a(:, :), scale(:), re(:), im(:), vectors(:, :)
+      real(wp), allocatable :: a(:, :), scale(:), re(:), im(:), vectors(:, :), doubt(:)
       character(len=kind_length), allocatable :: kind(:)
       complex(wp), allocatable :: eigenvalue(:)
-      integer, allocatable :: order(:)
+      integer, allocatable :: order(:), neutral(:)
       logical, allocatable :: mask(:)
       integer :: i, n_rigid, n_known, n_zero
 
       call first_order_matrix(a, scale, model, reduced)
-      call eigen(a, with_shapes, re, im, vectors, error)
+      call eigen(a, scale, modes%fastest**2, with_shapes, re, im, vectors, doubt, error)
       if (allocated(error)) return
       ! Zeros that must be there: the spin if angular momentum stays or nothing feels it, and folding at hinges without spring.
       n_rigid = 2*reduced%nw
@@ -312,12 +316,18 @@ contains
       mask = im(order) >= 0.0_wp
       mask(:n_known) = .false.
       order = pack(order, mask)
-      order = [pack(order, im(order) > 0.0_wp), pack(order, .not. im(order) > 0.0_wp)]
+      neutral = motions_of_zeros(pack(order, hypot(re(order), im(order)) <= doubt(order)))
+      order = pack(order, hypot(re(order), im(order)) > doubt(order))
+      order = [neutral, pack(order, im(order) > 0.0_wp), pack(order, .not. im(order) > 0.0_wp)]
+      re(neutral) = 0.0_wp
+      im(neutral) = 0.0_wp
       eigenvalue = cmplx(re(order), im(order), wp)
       allocate (kind(size(order)))
       kind = relaxation
       where (im(order) > 0.0_wp) kind = oscillation
+      kind(:size(neutral)) = mechanism
       call begin_modes(modes, model, reduced, eigenvalue, kind, n_rigid, n_zero, with_shapes)
+      modes%uncertainty(n_rigid + n_zero + 1:) = doubt(order)
       if (.not. with_shapes) return
       do i = 1, size(order)
          associate (vector => vector_of(vectors, im, order(i)))
@@ -326,6 +336,31 @@ contains
       end do
 
    contains
+
+      !> One of the zeros for each of the motions that they stand for: two zeros of one motion differ in its rate only.
+      function motions_of_zeros(zeros) result(motions)
+         integer, intent(in) :: zeros(:)
+         integer, allocatable :: motions(:)
+         complex(wp) :: x(reduced%nc), other(reduced%nc)
+         integer :: j, k
+
+         allocate (motions(0))
+         do j = 1, size(zeros)
+            x = place_of(vector_of(vectors, im, zeros(j)))
+            do k = 1, size(motions)
+               other = place_of(vector_of(vectors, im, motions(k)))
+               if (abs(dot_product(x, other))**2 > 0.99_wp*real(dot_product(x, x)*dot_product(other, other), wp)) exit
+            end do
+            if (k > size(motions)) motions = [motions, zeros(j)]
+         end do
+      end function motions_of_zeros
+
+      !> What a vector does to the chain's place.
+      pure function place_of(vector) result(x)
+         complex(wp), intent(in) :: vector(:)
+         complex(wp) :: x(reduced%nc)
+         x = vector(:reduced%nc)/scale
+      end function place_of
 
       !> Does a change of the spin stay as it is?
       logical function keeps_spin()
@@ -395,23 +430,44 @@ contains
       y(reduced%nw + 1:, :) = matmul(transpose(reduced%basis), chain)
    end function to_modes
 
-   !> Eigenvalues and right vectors by dgeev, which balances.
-   subroutine eigen(a, with_vectors, re, im, vectors, error)
+   !> Eigenvalues, right vectors, and what rounding may have done to the eigenvalues. A zero of two, or of three, that has fewer
+   !> vectors comes out as values of the size of the square, or cube, root of epsilon around it: their condition tells. It is
+   !> asked for, and vectors with it, only where a rate is so small that it might be such a zero, or where vectors are wanted.
+   !> The matrix is off by rounding of its norm, and, where it has stiffnesses over small scales, by rounding of the largest of them.
+   subroutine eigen(a, scale, stiffness, with_vectors, re, im, vectors, doubt, error)
       real(wp), intent(inout) :: a(:, :)
+      real(wp), intent(in) :: scale(:)  !! of the leading coordinates [1/s]
+      real(wp), intent(in) :: stiffness !! the largest, over the mass [1/s^2]
       logical, intent(in) :: with_vectors
-      real(wp), allocatable, intent(out) :: re(:), im(:), vectors(:, :)
+      real(wp), allocatable, intent(out) :: re(:), im(:), vectors(:, :) !! the last is not set where it is not needed
+      real(wp), allocatable, intent(out) :: doubt(:)                    !! [1/s]
       type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: work(:)
-      real(wp) :: left(1, 1), work_size(1)
-      character(len=1) :: job
-      integer :: info, n
+      real(wp), allocatable :: copy(:, :), left(:, :), work(:), balance(:), condition(:)
+      integer, allocatable :: unused(:)
+      real(wp) :: norm, work_size(1), of_vectors(1)
+      integer :: info, n, low, high, i
 
       n = size(a, 1)
-      job = merge('V', 'N', with_vectors)
-      allocate (re(n), im(n), vectors(n, merge(n, 1, with_vectors)))
-      call dgeev('N', job, n, a, n, re, im, left, 1, vectors, n, work_size, -1, info)
+      allocate (re(n), im(n), vectors(n, n), left(n, n), doubt(n), balance(n), condition(n), unused(2*n))
+      call dgeevx('B', 'V', 'V', 'E', n, a, n, re, im, left, n, vectors, n, low, high, balance, norm, condition, of_vectors, &
+                  work_size, -1, unused, info)
       allocate (work(int(work_size(1))))
-      call dgeev('N', job, n, a, n, re, im, left, 1, vectors, n, work, size(work), info)
+      info = 0
+      doubt = 0.0_wp
+      if (.not. with_vectors) then
+         copy = a
+         call dgeev('N', 'N', n, copy, n, re, im, left, n, vectors, n, work, size(work), info)
+      end if
+      if (with_vectors .or. (info == 0 .and. minval(hypot(re, im)) <= slow*maxval(hypot(re, im)))) then
+         call dgeevx('B', 'V', 'V', 'E', n, a, n, re, im, left, n, vectors, n, low, high, balance, norm, condition, of_vectors, &
+                     work, size(work), unused, info)
+         do i = 1, n
+            if (hypot(re(i), im(i)) > slow*maxval(hypot(re, im))) cycle
+            associate (x => vectors(:size(scale), merge(i - 1, i, im(i) < 0.0_wp)))
+               doubt(i) = rounding*(norm + stiffness*maxval(abs(x)/scale))/max(condition(i), epsilon(1.0_wp))
+            end associate
+         end do
+      end if
       if (info /= 0) call raise(error, 'dgeev: the QR algorithm did not find all eigenvalues')
    end subroutine eigen
 

@@ -54,6 +54,7 @@ contains
       subroutine write_axes()
          call axis('mode', [(i, i=1, modes%n)], 'rigid bodies, mechanisms, oscillations, relaxations; each by rising frequency')
          call axis('rod', [(i, i=1, scene%n)], 'rod, counted from the spacecraft')
+         call axis('hinge', [(i, i=0, scene%n - 1)], 'hinge, counted from the spacecraft')
          if (size(scene%hinges%relaxing) > 0) &
             call axis('joint', scene%hinges%relaxing, 'hinge whose rotation is a state, counted from the spacecraft')
          call names('coordinate', kept_names(scene, model, .false.), &
@@ -107,6 +108,7 @@ contains
                            error)
          call write_vector(file, 'state_acceleration', model%acceleration(model%kept(:model%n)), 'rate', &
                            'm s-2 or rad s-2', 'rates of these rates', error)
+         call write_configuration(file, scene, model, error)
       end subroutine write_state
 
       subroutine write_matrices()
@@ -132,6 +134,39 @@ contains
       end subroutine write_summary
 
    end subroutine write_modes
+
+   !> All of the state, with what locked hinges make redundant, slopes without inertia, and the hinges.
+   subroutine write_configuration(file, scene, model, error)
+      type(result_file), intent(in) :: file
+      type(scene_type), intent(in) :: scene
+      type(linear_model), intent(in) :: model
+      type(error_type), allocatable, intent(inout) :: error
+      real(wp), dimension(scene%n) :: alpha, beta, alpha_rate, beta_rate
+
+      call slopes(scene, model%q, model%p, alpha, beta, alpha_rate, beta_rate)
+      if (scene%n_base > 0 .and. .not. allocated(error)) then
+         call file%file%put_attribute('/', 'state_displacement_x', model%q(1), error)
+         if (.not. allocated(error)) call file%file%put_attribute('/', 'state_displacement_y', model%q(2), error)
+         if (.not. allocated(error)) call file%file%put_attribute('/', 'state_rotation', model%q(3), error)
+      end if
+      call per_rod('state_phi', model%q(scene%phi_at() + 1:scene%phi_at() + scene%n), 'rad', 'chord angle of the state')
+      call per_rod('state_alpha', alpha, 'rad', 'slope of the rod at its inner end')
+      call per_rod('state_beta', beta, 'rad', 'slope of the rod at its outer end')
+      if (scene%n_bend == 3) call per_rod('state_bubble', model%q(scene%bend_at(3) + 1:scene%bend_at(3) + scene%n), 'm', &
+                                          'deflection by the third bending shape')
+      call write_vector(file, 'state_hinge_angle', model%hinge_angle, 'hinge', 'rad', 'rotation of the hinge', error)
+      call write_vector(file, 'state_hinge_moment', model%hinge_moment, 'hinge', 'N m', &
+                        'moment in the hinge, on its inner body; that of a locked hinge holds it', error)
+
+   contains
+
+      subroutine per_rod(name, values, units, long_name)
+         character(len=*), intent(in) :: name, units, long_name
+         real(wp), contiguous, intent(in) :: values(:)
+         call write_vector(file, name, values, 'rod', units, long_name, error)
+      end subroutine per_rod
+
+   end subroutine write_configuration
 
    !> Names of the coordinates that are kept, or of their rates.
    function kept_names(scene, model, rates) result(names)
