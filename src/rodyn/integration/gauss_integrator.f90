@@ -78,6 +78,7 @@ module rodyn_gauss_integrator
       real(wp), allocatable :: power(:, :)   !! rates of the quadratures at the nodes of a step (s, n_states - 2 n_dof)
       real(wp), allocatable :: quadrature_error(:) !! in the last step (n_states - 2 n_dof)
       type(quadrature_refinement) :: refinement
+      logical :: refines = .true.            !! quadratures whose errors are too large
       real(wp), allocatable :: weight(:)     !! 1/tolerance of the rates (n_dof)
       real(wp), allocatable :: y(:), lost(:) !! state at t, and what rounding took from it (n_states)
       real(wp), allocatable :: y_before(:)   !! state at t_before
@@ -168,6 +169,7 @@ contains
          self%lost = 0.0_wp
       end if ! else the run goes on from its own last state, whose lost digits are still known
       self%has_history = .false.
+      self%refines = .true.
       self%i_grid = 0
       self%n_grid = 0
       self%now%h = 0.0_wp
@@ -684,10 +686,39 @@ contains
          if (self%n_grid > 0) return
          tolerance = self%system%quadrature_tolerance(self%options%rtol, y(2*m + 1:) + self%increment(2*m + 1:))
          if (maxval(error) <= tolerance) return
+         call compare_halves(self, t)
+         if (maxval(error) <= tolerance .or. .not. self%refines) return
          call self%refinement%refine(self%system, t, y, t + h, self%options%rtol, self%options%atol, tolerance, &
                                      self%increment(2*m + 1:), error, self%counts%n_rhs, ok)
+         self%refines = ok ! explicit steps cannot follow what is stiff: they are not tried again before the next start
       end associate
    end subroutine add_quadratures
+
+   !> A better estimate where the last coefficients do not fall off, as those of small fast vibrations: the distance to the
+   !> same rule on both halves of the step, with its own polynomials.
+   subroutine compare_halves(self, t)
+      class(gauss_integrator), intent(inout) :: self
+      real(wp), intent(in) :: t !! at the start of the step [s]
+      real(wp) :: matrix(s, s), both(size(self%quadrature_error))
+      logical :: ok
+      integer :: half, i
+
+      both = 0.0_wp
+      associate (m => self%mechanics%n_dof, h => self%now%h)
+         do half = 0, 1
+            matrix = self%rule%interpolation(0.5_wp*half, 0.5_wp)
+            call multiply(m, matrix, self%trial%q, self%guess)
+            call multiply(m, matrix, self%trial%p, self%trial%a) ! which nobody needs any more
+            do i = 1, s
+               self%node_state(:m) = self%guess(i, :)
+               self%node_state(m + 1:) = self%trial%a(i, :)
+               call self%system%quadratures(t + h*(0.5_wp*half + 0.5_wp*self%rule%c(i)), self%node_state, self%node_rate, ok)
+               both = both + 0.5_wp*h*self%rule%b(i)*self%node_rate
+            end do
+         end do
+         self%quadrature_error(:) = min(self%quadrature_error, abs(both - self%increment(2*m + 1:)))
+      end associate
+   end subroutine compare_halves
 
    !> What the rule neglects of the mean of a function, the part of degree 16, by how its last Legendre coefficients fall off.
    pure real(wp) function neglected(coefficient)

@@ -9,7 +9,7 @@ module rodyn_quadrature_refinement
    private
    public :: quadrature_refinement
 
-   integer, parameter :: most_steps = 1000 !! within one step
+   integer, parameter :: most_steps = 200 !! within one step
    real(wp), parameter :: safety = 0.9_wp, shrink = 1.0_wp/3.0_wp, grow = 6.0_wp
 
    !> Memory of such steps, taken when the first is needed.
