@@ -149,7 +149,7 @@ contains
          'c.nml:3: &case t_end = .true.: must be a number [s]'//nl//&
          'c.nml:3: &case n_outputs = 1.5: must be a whole number'//nl//&
          'c.nml:4: &output ledger = 1: must be .true. or .false.'//nl//&
-         'c.nml:4: &output compression = ''4'': must be a whole number'//nl//&
+         'c.nml:4: &output compression = ''4'': must be a whole number; without quotes'//nl//&
          'c.nml:5: &solver method = adams: must be ''auto'', ''adams'', ''bdf'', ''erk'', ''dop853'' or ''gauss'', in '//&
          'quotes')
    end subroutine wrong_types
@@ -248,7 +248,6 @@ contains
          'c.nml:1: &spacecraft mass: is required when motion = ''free'''//nl//&
          'c.nml:2: x: text outside of a group'//nl//&
          'c.nml:3: &chain length = 1, 2, 3: takes 1 or 2 values, one per rod, not 3'//nl//&
-         'c.nml:3: &chain hinge_stiffness: is required'//nl//&
          'c.nml:3: &chain bending_stiffness: is required unless bending = ''rigid'''//nl//&
          'c.nml:4: &chain hinge_stifness: unknown key; the nearest known one is '//'hinge_stiffness')
    end subroutine several_faults

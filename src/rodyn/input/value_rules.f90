@@ -78,11 +78,12 @@ contains
       logical :: digits
 
       hint = ''
-      if (value%kind == is_string) hint = '; without quotes'
-      if (value%kind /= is_word) return
+      if (value%kind /= is_word .and. value%kind /= is_string) return
       associate (text => document%text(value%first:value%last))
          digits = scan(text, '0123456789') > 0
-         if (scan(text, ';') > 0) then
+         if (value%kind == is_string) then
+            if (digits) hint = '; without quotes'
+         else if (scan(text, ';') > 0) then
             hint = '; values are separated by commas or blanks'
          else if (scan(text, '[](){}') > 0) then
             hint = '; values stand without brackets, and expressions are not computed'
