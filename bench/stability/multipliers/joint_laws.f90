@@ -164,6 +164,8 @@ contains
       case (4)
          kind = merge(9, 10, j%slides == 0)
          j%slides = merge(merge(1, -1, rate > 0.0_dp), 0, j%slides == 0)
+      case default ! a latch has no other branch
+         return
       end select
    end subroutine switch
 
