@@ -53,6 +53,7 @@ program bench_rhs
    call add('n = 4, varying force on a node', config)
    config = standard(4)
    config%spacecraft%motion = 'fixed'
+   config%initial%omega = 0.0_wp
    call add('n = 4, fixed spacecraft', config)
    config = standard(4)
    call add('n = 4, with ledger', config, ledger=.true.)

@@ -2,6 +2,7 @@
 program tester
    use test_testing, only: run_suite, suite_tally, unittest
    use test_article, only: collect_article
+   use test_case_check, only: collect_case_check
    use test_case_keys, only: collect_case_keys
    use test_case_reader, only: collect_case_reader
    use test_case_rules, only: collect_case_rules
@@ -77,6 +78,7 @@ program tester
    call run('schema', collect_schema)
    call run('sweep', collect_sweep)
    call run('case_keys', collect_case_keys)
+   call run('case_check', collect_case_check)
    call run('case_rules', collect_case_rules)
    call run('case_reader', collect_case_reader)
    call run('hdf5_files', collect_hdf5_files)

@@ -185,6 +185,7 @@ contains
       do i = 1, 5
          load%law = merge('constant    ', 'sine_squared', mod(i, 2) == 0)
          load%rate = uniform(0.5_wp, 3.0_wp)
+         if (load%law == 'constant') load%rate = 0.0_wp
          load%value = uniform(-500.0_wp, 500.0_wp)
          load%component = merge('X', 'Y', i <= 2)
          load%target = merge('spacecraft', 'node      ', i <= 3)

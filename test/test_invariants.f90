@@ -171,6 +171,7 @@ contains
          config%solver%rtol = 1.0e-13_wp
          config%solver%atol = 1.0e-14_wp
          config%loads%law = 'constant'
+         config%loads%rate = 0.0_wp
          call suit_method(config)
          config%chain%hinge_stiffness = 0.1_wp*config%chain%hinge_stiffness
          config%initial%phi = 0.25_wp*config%initial%phi

@@ -401,6 +401,8 @@ contains
       do bending = 1, 2
          config = case_config()
          call allocate_case(config, n)
+         config%spacecraft%mass = 100.0_wp
+         config%spacecraft%inertia = 10.0_wp
          config%model%bending = merge('rigid  ', 'dynamic', bending == 1)
          config%chain%length = 0.1_wp
          config%chain%mass_per_length = 2.0_wp

@@ -270,6 +270,7 @@ contains
       deallocate (config%loads)
       allocate (config%loads(1))
       config%loads(1) = load_config(component='M', law=law, value=1500.0_wp, rate=20.0_wp)
+      if (law /= 'sine_squared') config%loads(1)%rate = 0.0_wp
    end subroutine chain
 
 end module test_method_choice

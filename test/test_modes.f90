@@ -489,7 +489,7 @@ contains
                allocate (config%loads(0))
                config%chain%hinge_stiffness = config%chain%hinge_stiffness + 500.0_wp
                config%initial%phi = 0.0_wp
-               config%initial%omega = spin(i)
+               if (config%spacecraft%motion == 'free') config%initial%omega = spin(i)
                call motion_of(motion, y, config, error, ledger=.false.)
                if (.not. allocated(error)) call find_equilibrium(motion, 0.0_wp, y, error)
                if (.not. allocated(error)) call check_rest(config, y, kind_name(which), error)
@@ -543,6 +543,8 @@ contains
             call random_case(config, kinds(i), 3)
             config%loads = config%loads(4:5)
             config%loads%law = 'constant'
+            config%loads%rate = 0.0_wp
+            config%t_end = 240.0_wp
             config%loads%value = 0.1_wp*config%loads%value
             config%chain%hinge_stiffness = config%chain%hinge_stiffness + 500.0_wp
             config%chain%hinge_damping = 0.5_wp*config%chain%hinge_stiffness

@@ -2,7 +2,7 @@
 module test_moving
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
-   use rodyn_case_config, only: case_config, hinge_config, kink_config, load_config
+   use rodyn_case_config, only: none_given, case_config, hinge_config, kink_config, load_config
    use rodyn_kink_program, only: kink_set, kink_regime, new_kink_set, new_kink_regime, evaluate_kinks
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_text, only: to_text
@@ -100,10 +100,10 @@ contains
    function four_programs() result(programs)
       type(kink_config), allocatable :: programs(:)
       allocate (programs(4))
-      programs%t_start = 0.1_wp
-      programs%t_end = 0.9_wp
-      programs%value = 0.3_wp
-      programs%rate = 7.0_wp
+      programs(:3)%t_start = 0.1_wp
+      programs(:3)%t_end = 0.9_wp
+      programs(:3)%value = 0.3_wp
+      programs(3)%rate = 7.0_wp
       programs(1)%law = 'ramp'
       programs(2)%law = 'smooth_step'
       programs(3)%law = 'sine'
@@ -877,6 +877,7 @@ contains
          if (allocated(error)) return
          if (config%model%dampers == 'exact') cycle ! a run that starts with balanced dampers is another motion
          config%hinges(1)%held = .false.
+         config%hinges(1)%release_time = none_given
          call integrate(config, [0.0_wp, 0.6_wp], free, error)
          if (allocated(error)) return
          call check_close(error, held%rows(3)%phi, free%rows(2)%phi, 1.0e-8_wp, kind_name(which)//': released')

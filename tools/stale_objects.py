@@ -2,12 +2,14 @@
 
 fpm compiles a file when its text changed, or in the same build as a module it uses. A build that ends in its midst leaves files that
 were compiled with older definitions, and which the next build would keep. Those lose their digest here, and so are compiled anew.
+And fpm never takes out of a library what was once put in: one that holds a file which has been moved or removed is made anew.
 """
 
 from __future__ import annotations
 
 import pathlib
 import re
+import subprocess
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 
@@ -29,6 +31,11 @@ def main() -> None:
             needed = max((made.get(module_of.get(module, ""), 0) for module in modules), default=0)
             if name in made and needed > made[name]:
                 (folder / f"{name}.digest").unlink(missing_ok=True)
+        for library in folder.glob("lib*.a"):
+            held = subprocess.run(["ar", "t", library], capture_output=True, text=True, check=False).stdout.split()
+            if set(held) - set(used_by):
+                library.unlink()
+                (folder / f"{library.name}.digest").unlink(missing_ok=True)
 
 
 main()

@@ -3,7 +3,7 @@
 !> (`rodyn_locks`).
 module rodyn_frequencies
    use rodyn_kinds, only: wp
-   use rodyn_errors, only: error_type
+   use rodyn_errors, only: error_type, raise
    use rodyn_scene, only: scene_type
    use rodyn_assembled, only: assembled_system, new_assembled_system, mass_matrix
    use rodyn_locks, only: has_slaves, free_coordinates, reduce_matrix
@@ -22,6 +22,10 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(assembled_system) :: system
 
+      if (scene%n < 1 .or. size(q) < scene%n_dof) then
+         call raise(error, 'natural_frequencies: the scene is not compiled, or has more coordinates than q')
+         return
+      end if
       call new_assembled_system(system, scene, error)
       if (allocated(error)) return
       call eigenvalues(scene, q, system, system%k, frequency, error)

@@ -4,8 +4,9 @@
 !> The two integrals are there only with a ledger. Their error is controlled apart (`rodyn_ode`), so that a run with a ledger
 !> makes the same steps as one without.
 module rodyn_motion
+   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
    use rodyn_kinds, only: wp
-   use rodyn_errors, only: error_type
+   use rodyn_errors, only: error_type, raise
    use rodyn_lanes, only: lanes
    use rodyn_ode, only: mechanical_system, factorise_dense, solve_dense
    use rodyn_stiff_modes, only: stiff_modes
@@ -64,6 +65,10 @@ contains
       logical, intent(in) :: ledger
       type(error_type), allocatable, intent(out) :: error
 
+      if (scene%n < 1) then
+         call raise(error, 'new_motion: the scene is not compiled')
+         return
+      end if
       call new_dynamics(motion%dynamics, scene, error)
       if (allocated(error)) return
       motion%n_q = scene%n_q
@@ -77,7 +82,8 @@ contains
       motion%n_events = motion%events%n
    end subroutine new_motion
 
-   !> y at t = 0.
+   !> y at t = 0. Arrays that are not allocated are zero; with one of another length than that of the scene, all of y is NaN,
+   !> which no integrator takes.
    subroutine initial_state(motion, initial, y)
       type(motion_type), intent(in) :: motion
       type(initial_config), intent(in) :: initial
@@ -90,7 +96,8 @@ contains
             y(n_q + 1:n_q + 3) = [initial%velocity_x, initial%velocity_y, initial%omega]
          end if
          call place(scene%phi_at(), initial%phi, initial%phi_rate)
-         if (n_q > n_dof) call initial_joints(scene%hinges, initial%phi, spread(0.0_wp, 1, scene%n), y(n_dof + 1:n_q))
+         if (n_q > n_dof) call initial_joints(scene%hinges, y(scene%phi_at() + 1:scene%phi_at() + scene%n), &
+                                             spread(0.0_wp, 1, scene%n), y(n_dof + 1:n_q))
          if (.not. scene%dynamic_bending) return
          call place(scene%alpha_at(), initial%alpha, initial%alpha_rate)
          call place(scene%beta_at(), initial%beta, initial%beta_rate)
@@ -101,10 +108,21 @@ contains
 
       subroutine place(before, values, rates)
          integer, intent(in) :: before
-         real(wp), intent(in) :: values(:), rates(:)
-         y(before + 1:before + size(values)) = values
-         y(motion%n_q + before + 1:motion%n_q + before + size(rates)) = rates
+         real(wp), intent(in), optional :: values(:), rates(:) !! absent: not allocated
+         call put(before, values)
+         call put(motion%n_q + before, rates)
       end subroutine place
+
+      subroutine put(before, x)
+         integer, intent(in) :: before
+         real(wp), intent(in), optional :: x(:)
+         if (.not. present(x)) return
+         if (size(x) == motion%dynamics%scene%n) then
+            y(before + 1:before + size(x)) = x
+         else if (size(x) > 0) then
+            y = ieee_value(1.0_wp, ieee_quiet_nan)
+         end if
+      end subroutine put
 
    end subroutine initial_state
 

@@ -10,6 +10,7 @@
 !>     call set_value(document, 'chain.hinge_stiffness(0)', '7000.0', error)
 !>     call case_from_document(document, config, error)
 module rodyn_case_reader
+   use rodyn_case_check, only: complete_case
    use rodyn_case_config, only: case_config
    use rodyn_case_rules, only: check_case
    use rodyn_case_schema, only: case_extents, case_groups, case_rows
@@ -83,9 +84,7 @@ contains
       allocate (config%profiles(instances(checked, 'rod_profile')), config%loads(instances(checked, 'load')), &
                 config%kink_programs(instances(checked, 'kink_program')), config%hinges(instances(checked, 'hinge')))
       call visit_case(loader, config)
-      call complete_profiles(checked, config)
-      call complete_loads(checked, config)
-      call complete_kinks(checked, config)
+      call complete_case(config)
       call check_case(checked, config)
       call checked%faults%to_error(document%name, error)
    end subroutine case_from_document
@@ -107,43 +106,6 @@ contains
          rods_of = values(entry%first)%number
       end associate
    end function rods_of
-
-   !> Defaults of a load that come from other keys.
-   subroutine complete_loads(checked, config)
-      type(checked_document), intent(in) :: checked
-      type(case_config), intent(inout) :: config
-      integer :: i
-
-      do i = 1, size(config%loads)
-         associate (load => config%loads(i))
-            if (entry_of(checked, 'load', i, 't_end') == 0) load%t_end = config%t_end
-            if (load%law /= 'smooth_step') cycle
-            if (entry_of(checked, 'load', i, 'rise_time') == 0) load%rise_time = load%t_end - load%t_start
-         end associate
-      end do
-   end subroutine complete_loads
-
-   !> Profiles reach to the last rod.
-   subroutine complete_profiles(checked, config)
-      type(checked_document), intent(in) :: checked
-      type(case_config), intent(inout) :: config
-      integer :: i
-
-      do i = 1, size(config%profiles)
-         if (entry_of(checked, 'rod_profile', i, 'last_rod') == 0) config%profiles(i)%last_rod = config%chain%n_rods
-      end do
-   end subroutine complete_profiles
-
-   !> Times of loads, for kinks that move; a table knows its times.
-   subroutine complete_kinks(checked, config)
-      type(checked_document), intent(in) :: checked
-      type(case_config), intent(inout) :: config
-      integer :: i
-
-      do i = 1, size(config%kink_programs)
-         if (entry_of(checked, 'kink_program', i, 't_end') == 0) config%kink_programs(i)%t_end = config%t_end
-      end do
-   end subroutine complete_kinks
 
    !> A complete commented case that runs as it is.
    function default_case() result(text)

@@ -5,6 +5,7 @@
 !> and what is missing. Rules that tie several keys together are the reader's; it reports them with `blame`.
 module rodyn_checked_document
    use rodyn_faults, only: fault_list
+   use rodyn_key_judge, only: key_judge, no_such
    use rodyn_namelist_document, only: namelist_document, index_text, shown_values
    use rodyn_schema, only: schema_extent, schema_group, schema_row, group_index, misspelt_group, misspelt_key, nearest_group, &
       nearest_key, row_index
@@ -14,7 +15,7 @@ module rodyn_checked_document
    public :: checked_document, match_document, blame, require, no_such, entry_of, is_given, is_sound, group_at, instances
 
    !> The document, the schema, and what came out. Lives no longer than the document.
-   type :: checked_document
+   type, extends(key_judge) :: checked_document
       type(namelist_document), pointer :: document => null()
       type(schema_group), allocatable :: groups(:)
       type(schema_row), allocatable :: rows(:)
@@ -25,6 +26,11 @@ module rodyn_checked_document
       integer, allocatable :: row(:)  !! of each entry, also of a misspelt key; 0: none is near
       logical, allocatable :: ok(:)   !! of each entry: known, and its values keep the rules
       type(fault_list) :: faults
+   contains
+      procedure :: is_given
+      procedure :: is_sound
+      procedure :: blame
+      procedure :: require
    end type checked_document
 
 contains
@@ -205,79 +211,71 @@ contains
    end function entry_of
 
    !> Is the key given, rightly or wrongly?
-   logical function is_given(checked, group, instance, key)
-      type(checked_document), intent(in) :: checked
+   logical function is_given(self, group, instance, key)
+      class(checked_document), intent(in) :: self
       character(len=*), intent(in) :: group, key
       integer, intent(in) :: instance
       integer :: g
 
       is_given = .false.
-      g = group_at(checked, group, instance)
+      g = group_at(self, group, instance)
       if (g == 0) return
-      associate (entries => checked%document%groups(g))
-         is_given = any(checked%row(entries%first:entries%last) == row_index(checked%rows, group, key))
+      associate (entries => self%document%groups(g))
+         is_given = any(self%row(entries%first:entries%last) == row_index(self%rows, group, key))
       end associate
    end function is_given
 
    !> True unless some assignment to the key breaks a rule, so that its value is not known.
-   logical function is_sound(checked, group, instance, key) result(sound)
-      type(checked_document), intent(in) :: checked
+   logical function is_sound(self, group, instance, key) result(sound)
+      class(checked_document), intent(in) :: self
       character(len=*), intent(in) :: group, key
       integer, intent(in) :: instance
       integer :: e, g, r
 
       sound = .true.
-      g = group_at(checked, group, instance)
+      g = group_at(self, group, instance)
       if (g == 0) return
-      r = row_index(checked%rows, group, key)
-      do e = checked%document%groups(g)%first, checked%document%groups(g)%last
-         if (checked%row(e) == r .and. .not. checked%ok(e)) sound = .false.
+      r = row_index(self%rows, group, key)
+      do e = self%document%groups(g)%first, self%document%groups(g)%last
+         if (self%row(e) == r .and. .not. self%ok(e)) sound = .false.
       end do
    end function is_sound
 
    !> Note a fault of a key: in its line if it is given, else in that of its group, else in the last line.
-   subroutine blame(checked, group, instance, key, rule)
-      type(checked_document), intent(inout) :: checked
+   subroutine blame(self, group, instance, key, rule)
+      class(checked_document), intent(inout) :: self
       character(len=*), intent(in) :: group, key, rule
       integer, intent(in) :: instance !! which of the groups of that name
       character(len=:), allocatable :: shown
       integer :: e, g, line
 
-      if (checked%faults%full()) then
-         call checked%faults%add(0, '') ! only counted
+      if (self%faults%full()) then
+         call self%faults%add(0, '') ! only counted
          return
       end if
       shown = ''
-      line = checked%document%n_lines
-      g = group_at(checked, group, instance)
-      if (g > 0) line = checked%document%groups(g)%line
-      e = entry_of(checked, group, instance, key)
+      line = self%document%n_lines
+      g = group_at(self, group, instance)
+      if (g > 0) line = self%document%groups(g)%line
+      e = entry_of(self, group, instance, key)
       if (e > 0) then
-         associate (entry => checked%document%entries(e))
+         associate (entry => self%document%entries(e))
             line = entry%line
-            shown = index_text(entry)//' = '//shown_values(checked%document, entry)
+            shown = index_text(entry)//' = '//shown_values(self%document, entry)
          end associate
       end if
-      call checked%faults%add(line, '&'//group//' '//key//shown//': '//rule)
+      call self%faults%add(line, '&'//group//' '//key//shown//': '//rule)
    end subroutine blame
 
    !> Note a key that is not given but must be.
-   subroutine require(checked, group, instance, key, when)
-      type(checked_document), intent(inout) :: checked
+   subroutine require(self, group, instance, key, when)
+      class(checked_document), intent(inout) :: self
       character(len=*), intent(in) :: group, key
       integer, intent(in) :: instance
       character(len=*), intent(in) :: when !! as in 'is required '//when; empty: always
-      if (is_given(checked, group, instance, key)) return
-      if (is_misplaced(checked, key)) return
-      call blame(checked, group, instance, key, trim('is required '//when))
+      if (is_given(self, group, instance, key)) return
+      if (is_misplaced(self, key)) return
+      call blame(self, group, instance, key, trim('is required '//when))
    end subroutine require
-
-   !> The fault of a number that no rod, node, hinge ... has.
-   pure function no_such(what, first, last) result(rule)
-      character(len=*), intent(in) :: what
-      integer, intent(in) :: first, last
-      character(len=:), allocatable :: rule
-      rule = 'there is no such '//what//'; they are numbered '//to_text(first)//'..'//to_text(last)
-   end function no_such
 
 end module rodyn_checked_document

@@ -4,7 +4,7 @@ module rodyn_document_checks
    use rodyn_checked_document, only: checked_document, instances, no_such, require
    use rodyn_namelist_document, only: namelist_document, namelist_entry, index_text, is_integer, is_long_integer, is_string, &
       is_word, shown_value, shown_values
-   use rodyn_schema, only: schema_extent, schema_row, any_list, group_index, one_value, type_text, type_word
+   use rodyn_schema, only: schema_extent, schema_row, any_list, group_index, one_value, count_rule, type_text, type_word
    use rodyn_text, only: is_digit, to_text
    use rodyn_value_rules, only: broken_rule
    implicit none (type, external)
@@ -166,11 +166,8 @@ contains
          if (wanted == 1 .and. entry%indexed .and. given <= upper - entry%lower + 1) then
             call reject(checked, g, e, 'takes one value'//not_count(given, wanted, checked%document, entry)//'; write '// &
                         trim(entry%key)//'('//to_text(entry%lower)//':'//to_text(entry%lower + int(given) - 1)//') for all')
-         else if (wanted == 1) then
-            call reject(checked, g, e, 'takes one value'//not_count(given, wanted, checked%document, entry))
          else
-            call reject(checked, g, e, 'takes 1 or '//to_text(wanted)//' values, one per '//trim(extent%name) &
-               //not_count(given, wanted, checked%document, entry))
+            call reject(checked, g, e, count_rule(extent, wanted)//not_count(given, wanted, checked%document, entry))
          end if
       end associate
    end subroutine check_extent

@@ -1,9 +1,9 @@
 !> One scene from its initial state to the end: regime after regime of loads, event after event, output after output.
 module rodyn_simulation
    use rodyn_kinds, only: wp
-   use rodyn_errors, only: error_type
+   use rodyn_errors, only: error_type, raise
    use rodyn_motion, only: motion_type
-   use rodyn_integrator, only: integrator_type
+   use rodyn_integrator, only: integrator_type, time_text
    use rodyn_switch_times, only: interval_ends, same_time
    implicit none (type, external)
    private
@@ -68,6 +68,21 @@ contains
       end if
    end function time
 
+   !> Refuse times that no run can reach.
+   subroutine check_times(times, t_end, error)
+      type(output_times), intent(in) :: times
+      real(wp), intent(in) :: t_end !! [s]
+      type(error_type), allocatable, intent(out) :: error
+
+      if (.not. (t_end > 0.0_wp .and. t_end <= huge(t_end))) &
+         call raise(error, 'simulate: t_end = '//time_text(t_end)//' s: must be positive and finite')
+      if (allocated(error) .or. .not. allocated(times%listed)) return
+      associate (x => times%listed)
+         if (.not. all(x >= 0.0_wp .and. x <= t_end) .or. any(x(2:) < x(:size(x) - 1))) &
+            call raise(error, 'simulate: the output times must increase, from 0 or later to t_end = '//time_text(t_end)//' s')
+      end associate
+   end subroutine check_times
+
    !> Integrate from t = 0 to t_end and show the observer the states at `times`. At each switch of a load or a kink, at
    !> each release and each event of a hinge the integration stops exactly and starts anew. On failure t and y are the last
    !> good ones.
@@ -83,8 +98,10 @@ contains
       real(wp), allocatable :: ends(:)
       integer :: segment, next
 
-      ends = interval_ends(motion%dynamics%scene%switches, t_end)
       t = 0.0_wp
+      call check_times(times, t_end, error)
+      if (allocated(error)) return
+      ends = interval_ends(motion%dynamics%scene%switches, t_end)
       next = 1
       do segment = 1, size(ends)
          call motion%begin_regime(t, ends(segment), t_end, y, error)

@@ -55,7 +55,8 @@ contains
       if (.not. allocated(error)) call new_motion(motion, scene, .false., error)
       if (.not. allocated(error)) call modes_at_start(motion, config, equilibrium, loads, .true., model, modes, error)
       if (allocated(error)) return
-      origin%title = config%title
+      origin%title = ''
+      if (allocated(config%title)) origin%title = config%title
       origin%resolved_input = resolved_case(config)
       origin%notes = joined_lines(case_notes(config, .false.), notes_on(motion%dynamics%scene, model%q(:scene%n_dof), .false.))
       origin%sundials_version = sundials_version()

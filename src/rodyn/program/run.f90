@@ -98,7 +98,8 @@ contains
       call driver%make(error)
       if (allocated(error)) return
 
-      header%title = config%title
+      header%title = ''
+      if (allocated(config%title)) header%title = config%title
       header%input = ''
       header%resolved_input = resolved_case(config)
       header%sundials_version = sundials_version()

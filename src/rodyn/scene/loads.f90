@@ -92,7 +92,6 @@ contains
       case ('smooth_step')
          load%law = law_smooth_step
          load%rise = given%rise_time
-         if (load%rise <= 0.0_wp) load%rise = given%t_end - given%t_start
       case ('table')
          load%law = law_table
          load%times = given%times

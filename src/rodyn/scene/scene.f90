@@ -8,6 +8,7 @@
 module rodyn_scene
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type, raise, exit_bad_input
+   use rodyn_case_check, only: sound_case
    use rodyn_case_config, only: case_config
    use rodyn_quadrature, only: gauss_rule, new_gauss_rule
    use rodyn_rod_constants, only: rod_constants, new_rod_constants
@@ -102,14 +103,15 @@ contains
       rod = self%rods(self%rod_of(k))
    end function rod
 
-   !> Compile a case. Fails, with the reason, on a combination that has no meaning.
-   subroutine new_scene(scene, config, error)
+   !> Compile a case. Fails, exit code 2, with all faults that `rodyn check` would find in it, in the same words.
+   subroutine new_scene(scene, given, error)
       type(scene_type), intent(out) :: scene
-      type(case_config), intent(in) :: config
+      type(case_config), intent(in) :: given
       type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config !! with what is not given
       integer :: k
 
-      call check_combination(config, error)
+      call sound_case(given, config, error)
       if (allocated(error)) return
       scene%n = config%chain%n_rods
       scene%n_base = merge(0, 3, config%spacecraft%motion == 'fixed')
@@ -153,29 +155,6 @@ contains
          end do
       end associate
    end subroutine collect_switches
-
-   !> What a combination of choices forbids, docs/model.md sec. 5.
-   subroutine check_combination(config, error)
-      type(case_config), intent(in) :: config
-      type(error_type), allocatable, intent(out) :: error
-
-      associate (model => config%model)
-         if (config%chain%n_rods < 1) &
-            call raise(error, "&chain n_rods: at least one rod", exit_bad_input)
-         if (model%bending == 'dynamic' .and. model%inertia == 'lumped') &
-            call raise(error, "&model: bending = 'dynamic' needs inertia = 'distributed' "// &
-                       "(rods without inertia have no bending motion of their own)", exit_bad_input)
-         if (model%bending == 'quasistatic' .and. model%inertia == 'distributed') &
-            call raise(error, "&model: bending = 'quasistatic' needs inertia = 'lumped'", exit_bad_input)
-         if (model%bending_shapes == 3 .and. model%bending /= 'dynamic') &
-            call raise(error, "&model: bending_shapes = 3 needs bending = 'dynamic'", exit_bad_input)
-         if (model%bending_shapes == 3 .and. model%gauss_points < 5) &
-            call raise(error, "&model: bending_shapes = 3 needs gauss_points = 5 or more (the square of the third shape has "// &
-                       "degree 8)", exit_bad_input)
-         if (model%bending_shapes /= 2 .and. model%bending_shapes /= 3) &
-            call raise(error, "&model: bending_shapes must be 2 or 3", exit_bad_input)
-      end associate
-   end subroutine check_combination
 
    !> Integrals and derived constants, once per distinct (length, mass per length, stiffness, profiles).
    subroutine compile_rods(scene, config, error)

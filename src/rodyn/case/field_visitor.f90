@@ -9,6 +9,7 @@ module rodyn_field_visitor
 
    !> What is done at each key
    type, abstract :: field_visitor
+      logical :: every_key = .false. !! also those that the law of a load or a kink does not take
    contains
       procedure(open_interface), deferred :: open_group
       procedure(close_interface), deferred :: close_group

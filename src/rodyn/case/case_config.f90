@@ -1,9 +1,9 @@
 !> One case as the user describes it: plain values in SI units and radians, one type per namelist group.
 !>
-!> Arrays are allocated to their full length (a single value in the namelist has been spread out already):
-!> rods and nodes count 1..n, hinges 0..n-1. Values have been checked one by one; what only a combination
-!> forbids is found by `new_scene`. Defaults stand in one place, the tables of `rodyn_case_schema`;
-!> the initial values here only serve library users who fill a case by hand.
+!> Arrays are as long as what they run over: rods and nodes count 1..n, hinges 0..n-1. What a library user leaves out, an array
+!> that is not allocated or a number with its initial value, has the default that a file would give it; `new_scene` checks a case
+!> as a file is checked (`rodyn_case_check`). Defaults stand in one place, the table of `rodyn_case_schema`; the initial values
+!> here serve cases that are filled by hand.
 module rodyn_case_config
    use rodyn_kinds, only: wp
    implicit none (type, external)
@@ -84,10 +84,10 @@ module rodyn_case_config
       character(len=name_length) :: component = 'M'       !! 'X', 'Y' [N] or 'M' [N m], moving axes
       character(len=name_length) :: law = 'constant'      !! 'constant', 'table', 'sine_squared', 'smooth_step'
       real(wp) :: t_start = 0.0_wp                        !! [s]
-      real(wp) :: t_end = huge(1.0_wp)                    !! [s]; huge: never ends
+      real(wp) :: t_end = none_given                      !! [s]; none_given: t_end of the case
       real(wp) :: value = 0.0_wp                          !! amplitude [N] or [N m]
       real(wp) :: rate = 0.0_wp                           !! of sine_squared [rad/s]
-      real(wp) :: rise_time = 0.0_wp                      !! of smooth_step [s]
+      real(wp) :: rise_time = 0.0_wp                      !! of smooth_step [s]; 0: t_end - t_start
       real(wp), allocatable :: times(:)                   !! of table, increasing [s]
       real(wp), allocatable :: values(:)                  !! of table [N] or [N m]
       character(len=name_length) :: after = 'zero'        !! of table, beyond its last time: 'zero' or 'hold'
@@ -98,7 +98,7 @@ module rodyn_case_config
       integer :: hinge = 0                      !! 0..n-1
       character(len=name_length) :: law = 'smooth_step' !! 'ramp', 'smooth_step', 'sine' or 'table'
       real(wp) :: t_start = 0.0_wp              !! [s]
-      real(wp) :: t_end = 0.0_wp                !! [s]; t_start: a step
+      real(wp) :: t_end = none_given            !! [s]; t_start: a step; none_given: t_end of the case
       real(wp) :: value = 0.0_wp                !! change of the kink, or amplitude [rad]
       real(wp) :: rate = 0.0_wp                 !! of sine [rad/s]
       real(wp), allocatable :: times(:)         !! of table, increasing [s]

@@ -1,7 +1,7 @@
 !> Rules of laws in time, of loads and of driven kinks alike.
 module rodyn_law_rules
    use rodyn_kinds, only: wp
-   use rodyn_checked_document, only: checked_document, blame, entry_of, is_given, is_sound, require
+   use rodyn_key_judge, only: key_judge
    use rodyn_switch_times, only: same_time
    use rodyn_text, only: short_text, to_text
    implicit none (type, external)
@@ -11,8 +11,8 @@ module rodyn_law_rules
 contains
 
    !> Each law has its own keys and takes no others.
-   subroutine check_law_keys(checked, group, i, law, keys, takes, needs)
-      type(checked_document), intent(inout) :: checked
+   subroutine check_law_keys(judge, group, i, law, keys, takes, needs)
+      class(key_judge), intent(inout) :: judge
       character(len=*), intent(in) :: group
       integer, intent(in) :: i !! which of these groups
       character(len=*), intent(in) :: law
@@ -21,21 +21,21 @@ contains
       character(len=:), allocatable :: key, named
       integer :: k
 
-      if (.not. is_sound(checked, group, i, 'law')) return
+      if (.not. judge%is_sound(group, i, 'law')) return
       named = "law = '"//trim(law)//"'"
       do k = 1, size(keys)
          key = trim(keys(k))
          if (.not. takes(k)) then
-            if (is_given(checked, group, i, key)) call blame(checked, group, i, key, 'does not go with '//named)
+            if (judge%is_given(group, i, key)) call judge%blame(group, i, key, 'does not go with '//named)
          else if (needs(k)) then
-            call require(checked, group, i, key, 'when '//named)
+            call judge%require(group, i, key, 'when '//named)
          end if
       end do
    end subroutine check_law_keys
 
    !> As many values as times, two at least, and times that increase: of a spline by more than rounding.
-   subroutine check_table(checked, group, i, times, values, spline)
-      type(checked_document), intent(inout) :: checked
+   subroutine check_table(judge, group, i, times, values, spline)
+      class(key_judge), intent(inout) :: judge
       character(len=*), intent(in) :: group
       integer, intent(in) :: i !! which of these groups
       real(wp), allocatable, intent(in) :: times(:)  !! [s]
@@ -43,17 +43,25 @@ contains
       logical, intent(in) :: spline !! smooth at its times; a load may jump there
       integer :: k
 
-      if (entry_of(checked, group, i, 'times') == 0) return
-      if (size(times) < 2) call blame(checked, group, i, 'times', 'must be two values at least')
+      if (.not. gives(judge, group, i, 'times')) return
+      if (size(times) < 2) call judge%blame(group, i, 'times', 'must be two values at least')
       do k = 2, size(times)
          if (times(k) > times(k - 1) .and. .not. (spline .and. same_time(times(k), times(k - 1)))) cycle
-         call blame(checked, group, i, 'times', 'must increase, but value '//to_text(k)//', '//short_text(times(k))// &
+         call judge%blame(group, i, 'times', 'must increase, but value '//to_text(k)//', '//short_text(times(k))// &
                     ', follows '//short_text(times(k - 1))//' [s]')
          exit
       end do
-      if (entry_of(checked, group, i, 'values') == 0) return
-      if (size(values) /= size(times)) call blame(checked, group, i, 'values', 'must be as many as times: '// &
+      if (.not. gives(judge, group, i, 'values')) return
+      if (size(values) /= size(times)) call judge%blame(group, i, 'values', 'must be as many as times: '// &
                                                   to_text(size(times))//', not '//to_text(size(values)))
    end subroutine check_table
+
+   !> Is a key given, and rightly?
+   logical function gives(judge, group, i, key)
+      class(key_judge), intent(in) :: judge
+      character(len=*), intent(in) :: group, key
+      integer, intent(in) :: i
+      gives = judge%is_given(group, i, key) .and. judge%is_sound(group, i, key)
+   end function gives
 
 end module rodyn_law_rules

@@ -1,4 +1,4 @@
-!> The faults of one input file, collected until all are known, then shown together.
+!> The faults of one input, a file or a case in memory, collected until all are known, then shown together.
 module rodyn_faults
    use rodyn_errors, only: error_type, raise, exit_bad_input
    use rodyn_text, only: to_text
@@ -55,22 +55,26 @@ contains
    !> Raise an error that shows all faults, sorted by line; nothing happens if there are none.
    subroutine to_error(self, name, error)
       class(fault_list), intent(in) :: self
-      character(len=*), intent(in) :: name !! of the file
+      character(len=*), intent(in) :: name !! of the file; empty: a case in memory
       type(error_type), allocatable, intent(out) :: error
       type(text_buffer) :: message
+      character(len=:), allocatable :: place
       integer, allocatable :: order(:)
       integer :: i, k
 
       if (self%n == 0) return
+      place = ''
+      if (len(name) > 0) place = name//':'
       order = sorted(self%line(:min(self%n, max_shown)))
       do i = 1, size(order)
          k = order(i)
          if (i > 1) call message%append(new_line('a'))
-         call message%append(name//':')
+         call message%append(place)
          if (self%line(k) > 0) call message%append(to_text(self%line(k))//':')
-         call message%append(' '//self%buffer%part(self%first(k), self%last(k)))
+         if (len(name) > 0) call message%append(' ')
+         call message%append(self%buffer%part(self%first(k), self%last(k)))
       end do
-      if (self%n > max_shown) call message%append(new_line('a')//name//': and ' &
+      if (self%n > max_shown) call message%append(new_line('a')//place//' and ' &
          //to_text(self%n - max_shown)//' more faults')
       call raise(error, message%content(), exit_bad_input)
    end subroutine to_error

@@ -3,7 +3,7 @@ module rodyn_case_rules
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: case_config, load_config, profile_config
    use rodyn_case_fields, only: law_takes
-   use rodyn_checked_document, only: checked_document, blame, is_given, is_sound, no_such, require
+   use rodyn_key_judge, only: key_judge, no_such
    use rodyn_hinge_rules, only: check_moving_hinges
    use rodyn_law_rules, only: check_law_keys, check_table
    use rodyn_rod_profile, only: rod_profile, new_rod_profile, smallest_value
@@ -18,42 +18,42 @@ module rodyn_case_rules
 contains
 
    !> Note everything that is wrong with the case as a whole.
-   subroutine check_case(checked, config)
-      type(checked_document), intent(inout) :: checked
-      type(case_config), intent(in) :: config
+   subroutine check_case(judge, config)
+      class(key_judge), intent(inout) :: judge
+      type(case_config), intent(in) :: config !! its lists are allocated
       integer :: i, k
 
-      call check_spacecraft(checked, config)
-      call check_model(checked, config)
-      call check_bending(checked, config)
-      call check_masses(checked, config)
-      call check_solver(checked, config)
+      call check_spacecraft(judge, config)
+      call check_model(judge, config)
+      call check_bending(judge, config)
+      call check_masses(judge, config)
+      call check_solver(judge, config)
       do i = 1, size(config%profiles)
-         call check_profile_rods(checked, i, config%profiles(i), config%chain%n_rods)
-         call check_profile(checked, i, config%profiles(i), config%model%bending == 'quasistatic')
+         call check_profile_rods(judge, i, config%profiles(i), config%chain%n_rods)
+         call check_profile(judge, i, config%profiles(i), config%model%bending == 'quasistatic')
       end do
       do i = 1, size(config%loads)
-         call check_target(checked, i, config%loads(i), config%chain%n_rods)
+         call check_target(judge, i, config%loads(i), config%chain%n_rods)
          associate (law => config%loads(i)%law)
-            call check_law_keys(checked, 'load', i, law, law_keys, [(law_takes(law, trim(law_keys(k))), k=1, size(law_keys))], &
+            call check_law_keys(judge, 'load', i, law, law_keys, [(law_takes(law, trim(law_keys(k))), k=1, size(law_keys))], &
                                 law_keys /= 'rise_time' .and. law_keys /= 'after')
          end associate
-         call check_times(checked, i, config%loads(i))
-         if (config%loads(i)%law == 'table') call check_table(checked, 'load', i, config%loads(i)%times, &
+         call check_times(judge, i, config%loads(i))
+         if (config%loads(i)%law == 'table') call check_table(judge, 'load', i, config%loads(i)%times, &
                                                                      config%loads(i)%values, .false.)
       end do
-      call check_moving_hinges(checked, config)
+      call check_moving_hinges(judge, config)
    end subroutine check_case
 
    !> A free spacecraft has mass and inertia; a fixed one does not move.
-   subroutine check_spacecraft(checked, config)
-      type(checked_document), intent(inout) :: checked
+   subroutine check_spacecraft(judge, config)
+      class(key_judge), intent(inout) :: judge
       type(case_config), intent(in) :: config
 
-      if (.not. is_sound(checked, 'spacecraft', 1, 'motion')) return
+      if (.not. judge%is_sound('spacecraft', 1, 'motion')) return
       if (config%spacecraft%motion == 'free') then
-         call require(checked, 'spacecraft', 1, 'mass', "when motion = 'free'")
-         call require(checked, 'spacecraft', 1, 'inertia', "when motion = 'free'")
+         call judge%require('spacecraft', 1, 'mass', "when motion = 'free'")
+         call judge%require('spacecraft', 1, 'inertia', "when motion = 'free'")
          return
       end if
       call require_zero('velocity_x', config%initial%velocity_x)
@@ -68,45 +68,45 @@ contains
       subroutine require_zero(key, x)
          character(len=*), intent(in) :: key
          real(wp), intent(in) :: x
-         if (abs(x) > 0.0_wp) call blame(checked, 'initial', 1, key, "must be 0 when motion = 'fixed'")
+         if (abs(x) > 0.0_wp) call judge%blame('initial', 1, key, "must be 0 when motion = 'fixed'")
       end subroutine require_zero
 
    end subroutine check_spacecraft
 
    !> docs/model.md sec. 5: which bending goes with which inertia.
-   subroutine check_model(checked, config)
-      type(checked_document), intent(inout) :: checked
+   subroutine check_model(judge, config)
+      class(key_judge), intent(inout) :: judge
       type(case_config), intent(in) :: config
       character(len=:), allocatable :: key
 
-      if (.not. (is_sound(checked, 'model', 1, 'bending') .and. is_sound(checked, 'model', 1, 'inertia'))) return
+      if (.not. (judge%is_sound('model', 1, 'bending') .and. judge%is_sound('model', 1, 'inertia'))) return
       key = 'bending'
-      if (.not. is_given(checked, 'model', 1, key)) key = 'inertia'
+      if (.not. judge%is_given('model', 1, key)) key = 'inertia'
       if (config%model%bending == 'dynamic' .and. config%model%inertia == 'lumped') then
-         call blame(checked, 'model', 1, key, "bending = 'dynamic' is not possible with inertia = 'lumped'; " &
+         call judge%blame('model', 1, key, "bending = 'dynamic' is not possible with inertia = 'lumped'; " &
             //"take 'quasistatic' or 'rigid'")
       else if (config%model%bending == 'quasistatic' .and. config%model%inertia == 'distributed') then
-         call blame(checked, 'model', 1, key, &
+         call judge%blame('model', 1, key, &
             "bending = 'quasistatic' is not possible with inertia = 'distributed'; "//&
             "take 'dynamic' or 'rigid', or inertia = 'lumped'")
       end if
-      if (.not. is_sound(checked, 'model', 1, 'bending_shapes') .or. config%model%bending_shapes /= 3) return
+      if (.not. judge%is_sound('model', 1, 'bending_shapes') .or. config%model%bending_shapes /= 3) return
       if (config%model%bending /= 'dynamic') then
-         call blame(checked, 'model', 1, 'bending_shapes', "3 is possible with bending = 'dynamic' only")
-      else if (is_sound(checked, 'model', 1, 'gauss_points') .and. config%model%gauss_points < 5) then
-         call blame(checked, 'model', 1, 'bending_shapes', &
+         call judge%blame('model', 1, 'bending_shapes', "3 is possible with bending = 'dynamic' only")
+      else if (judge%is_sound('model', 1, 'gauss_points') .and. config%model%gauss_points < 5) then
+         call judge%blame('model', 1, 'bending_shapes', &
                     '3 needs gauss_points = 5 or more (the square of the third shape has degree 8)')
       end if
    end subroutine check_model
 
    !> Only dynamic bending has slopes of its own; only rigid rods need no stiffness.
-   subroutine check_bending(checked, config)
-      type(checked_document), intent(inout) :: checked
+   subroutine check_bending(judge, config)
+      class(key_judge), intent(inout) :: judge
       type(case_config), intent(in) :: config
       character(len=:), allocatable :: reason
 
-      if (.not. is_sound(checked, 'model', 1, 'bending')) return
-      if (config%model%bending /= 'rigid') call require(checked, 'chain', 1, 'bending_stiffness', &
+      if (.not. judge%is_sound('model', 1, 'bending')) return
+      if (config%model%bending /= 'rigid') call judge%require('chain', 1, 'bending_stiffness', &
          "unless bending = 'rigid'")
       if (config%model%bending /= 'dynamic') then
          reason = "bending = '"//trim(config%model%bending)//"'"
@@ -125,33 +125,33 @@ contains
       subroutine require_zero(key, x)
          character(len=*), intent(in) :: key
          real(wp), intent(in) :: x(:)
-         if (any(abs(x) > 0.0_wp)) call blame(checked, 'initial', 1, key, 'must be 0 when '//reason)
+         if (any(abs(x) > 0.0_wp)) call judge%blame('initial', 1, key, 'must be 0 when '//reason)
       end subroutine require_zero
 
    end subroutine check_bending
 
    !> What moves has mass: the shapes of a rod that bends as motion, and every node or the rod before it.
-   subroutine check_masses(checked, config)
-      type(checked_document), intent(inout) :: checked
+   subroutine check_masses(judge, config)
+      class(key_judge), intent(inout) :: judge
       type(case_config), intent(in) :: config
       real(wp), allocatable :: mass(:)
 
-      if (.not. (is_sound(checked, 'model', 1, 'bending') .and. is_sound(checked, 'model', 1, 'inertia'))) return
+      if (.not. (judge%is_sound('model', 1, 'bending') .and. judge%is_sound('model', 1, 'inertia'))) return
       if (config%model%bending == 'dynamic') then
-         if (is_sound(checked, 'model', 1, 'gauss_points') .and. config%model%gauss_points < 2) &
-            call blame(checked, 'model', 1, 'gauss_points', "must be at least 2 when bending = 'dynamic'")
+         if (judge%is_sound('model', 1, 'gauss_points') .and. config%model%gauss_points < 2) &
+            call judge%blame('model', 1, 'gauss_points', "must be at least 2 when bending = 'dynamic'")
       end if
       if (.not. sound_chain('mass_per_length')) return
       mass = config%chain%mass_per_length
       if (config%model%bending == 'dynamic') then
-         if (any(mass <= 0.0_wp)) call blame(checked, 'chain', 1, 'mass_per_length', &
+         if (any(mass <= 0.0_wp)) call judge%blame('chain', 1, 'mass_per_length', &
             "must be positive when bending = 'dynamic', but is 0 for rod "//to_text(findloc(mass <= 0.0_wp, .true., 1)))
          return
       end if
-      if (.not. is_sound(checked, 'chain', 1, 'node_mass') .or. size(config%chain%node_mass) /= size(mass)) return
+      if (.not. judge%is_sound('chain', 1, 'node_mass') .or. size(config%chain%node_mass) /= size(mass)) return
       if (config%model%inertia == 'lumped') mass(:size(mass) - 1) = mass(:size(mass) - 1) + mass(2:) ! half of each to a node
       mass = mass + config%chain%node_mass
-      if (any(mass <= 0.0_wp)) call blame(checked, 'chain', 1, 'node_mass', &
+      if (any(mass <= 0.0_wp)) call judge%blame('chain', 1, 'node_mass', &
          'rod '//to_text(findloc(mass <= 0.0_wp, .true., 1))//' and its outer node are both without mass')
 
    contains
@@ -161,69 +161,72 @@ contains
          character(len=*), intent(in) :: key
          sound_chain = .false.
          if (config%chain%n_rods < 1) return
-         if (.not. is_sound(checked, 'chain', 1, key) .or. .not. is_given(checked, 'chain', 1, key)) return
+         if (.not. judge%is_sound('chain', 1, key) .or. .not. judge%is_given('chain', 1, key)) return
          sound_chain = size(config%chain%mass_per_length) == config%chain%n_rods
       end function sound_chain
 
    end subroutine check_masses
 
    !> A profile reaches from one existing rod to another.
-   subroutine check_profile_rods(checked, i, profile, n_rods)
-      type(checked_document), intent(inout) :: checked
+   subroutine check_profile_rods(judge, i, profile, n_rods)
+      class(key_judge), intent(inout) :: judge
       integer, intent(in) :: i !! which profile
       type(profile_config), intent(in) :: profile
       integer, intent(in) :: n_rods !! 0: not known
 
-      if (.not. (is_sound(checked, 'rod_profile', i, 'first_rod') .and. is_sound(checked, 'rod_profile', i, 'last_rod'))) return
+      if (.not. (judge%is_sound('rod_profile', i, 'first_rod') .and. judge%is_sound('rod_profile', i, 'last_rod'))) return
       if (n_rods > 0 .and. max(profile%first_rod, profile%last_rod) > n_rods) then
-         call blame(checked, 'rod_profile', i, trim(merge('first_rod', 'last_rod ', profile%first_rod > n_rods)), &
+         call judge%blame('rod_profile', i, trim(merge('first_rod', 'last_rod ', profile%first_rod > n_rods)), &
             no_such('rod', 1, n_rods))
       else if (n_rods > 0 .and. profile%first_rod > profile%last_rod) then
-         call blame(checked, 'rod_profile', i, 'last_rod', 'must not be less than first_rod = '//to_text(profile%first_rod))
+         call judge%blame('rod_profile', i, 'last_rod', 'must not be less than first_rod = '//to_text(profile%first_rod))
       end if
    end subroutine check_profile_rods
 
    !> A polynomial or a table, and a factor that is nowhere negative: not zero either where rods bend by statics alone, whose
    !> flexibility is 1/EI.
-   subroutine check_profile(checked, i, profile, positive)
-      type(checked_document), intent(inout) :: checked
+   subroutine check_profile(judge, i, profile, positive)
+      class(key_judge), intent(inout) :: judge
       integer, intent(in) :: i !! which profile
       type(profile_config), intent(in) :: profile
       logical, intent(in) :: positive !! zero is no bending stiffness
       type(rod_profile) :: compiled
       character(len=:), allocatable :: key
+      real(wp) :: rounding
       logical :: ok
 
       key = 'polynomial'
-      if (is_given(checked, 'rod_profile', i, 'positions') .or. is_given(checked, 'rod_profile', i, 'values')) then
-         if (is_given(checked, 'rod_profile', i, key)) then
-            call blame(checked, 'rod_profile', i, key, 'does not go with positions and values')
+      if (judge%is_given('rod_profile', i, 'positions') .or. judge%is_given('rod_profile', i, 'values')) then
+         if (judge%is_given('rod_profile', i, key)) then
+            call judge%blame('rod_profile', i, key, 'does not go with positions and values')
             return
          end if
          key = 'values'
-         call require(checked, 'rod_profile', i, 'positions', 'with values')
-         call require(checked, 'rod_profile', i, 'values', 'with positions')
+         call judge%require('rod_profile', i, 'positions', 'with values')
+         call judge%require('rod_profile', i, 'values', 'with positions')
          if (size(profile%positions) == 0 .or. size(profile%values) == 0) return
-         call check_positions(checked, i, profile, ok)
+         call check_positions(judge, i, profile, ok)
          if (.not. ok) return
       else
-         call require(checked, 'rod_profile', i, key, 'unless positions and values are given')
+         call judge%require('rod_profile', i, key, 'unless positions and values are given')
       end if
-      if (.not. is_sound(checked, 'rod_profile', i, key) .or. .not. is_sound(checked, 'rod_profile', i, 'positions')) return
+      if (.not. judge%is_sound('rod_profile', i, key) .or. .not. judge%is_sound('rod_profile', i, 'positions')) return
       call new_rod_profile(compiled, profile)
-      if (smallest_value(compiled) < 0.0_wp) then
-         call blame(checked, 'rod_profile', i, key, 'must not be negative anywhere from 0 to 1, but goes down to '// &
+      rounding = 0.0_wp ! of a polynomial that touches zero
+      if (key == 'polynomial') rounding = 16.0_wp*epsilon(1.0_wp)*sum(abs(profile%polynomial))
+      if (smallest_value(compiled) < -rounding) then
+         call judge%blame('rod_profile', i, key, 'must not be negative anywhere from 0 to 1, but goes down to '// &
             short_text(smallest_value(compiled)))
       else if (.not. compiled%mean() > 0.0_wp) then
-         call blame(checked, 'rod_profile', i, key, 'must not be zero everywhere')
+         call judge%blame('rod_profile', i, key, 'must not be zero everywhere')
       else if (positive .and. profile%quantity == 'bending_stiffness' .and. .not. smallest_value(compiled) > 0.0_wp) then
-         call blame(checked, 'rod_profile', i, key, "must be positive from 0 to 1 when bending = 'quasistatic'")
+         call judge%blame('rod_profile', i, key, "must be positive from 0 to 1 when bending = 'quasistatic'")
       end if
    end subroutine check_profile
 
    !> As many values as positions, which rise from 0 to 1; two may be equal, three not.
-   subroutine check_positions(checked, i, profile, ok)
-      type(checked_document), intent(inout) :: checked
+   subroutine check_positions(judge, i, profile, ok)
+      class(key_judge), intent(inout) :: judge
       integer, intent(in) :: i
       type(profile_config), intent(in) :: profile
       logical, intent(out) :: ok
@@ -231,12 +234,12 @@ contains
       ok = .false.
       associate (p => profile%positions, n => size(profile%positions))
          if (size(profile%values) /= n) then
-            call blame(checked, 'rod_profile', i, 'values', 'must be as many as positions: '//to_text(n)//', not '// &
+            call judge%blame('rod_profile', i, 'values', 'must be as many as positions: '//to_text(n)//', not '// &
                to_text(size(profile%values)))
          else if (n < 2 .or. any(abs(p([1, n]) - [0.0_wp, 1.0_wp]) > 0.0_wp)) then
-            call blame(checked, 'rod_profile', i, 'positions', 'must begin with 0 and end with 1')
+            call judge%blame('rod_profile', i, 'positions', 'must begin with 0 and end with 1')
          else if (any(p(2:) < p(:n - 1)) .or. any(p(3:) <= p(:n - 2)) .or. p(2) <= 0.0_wp .or. p(n - 1) >= 1.0_wp) then
-            call blame(checked, 'rod_profile', i, 'positions', &
+            call judge%blame('rod_profile', i, 'positions', &
                'must rise; two equal ones make a jump, but not three, nor at the ends')
          else
             ok = .true.
@@ -245,19 +248,19 @@ contains
    end subroutine check_positions
 
    !> Each method has its orders; only some take fixed steps.
-   subroutine check_solver(checked, config)
-      type(checked_document), intent(inout) :: checked
+   subroutine check_solver(judge, config)
+      class(key_judge), intent(inout) :: judge
       type(case_config), intent(in) :: config
       character(len=:), allocatable :: rule
 
-      if (.not. is_sound(checked, 'solver', 1, 'method')) return
+      if (.not. judge%is_sound('solver', 1, 'method')) return
       rule = order_rule(config%solver%method, config%solver%order)
-      if (len(rule) > 0 .and. is_sound(checked, 'solver', 1, 'order')) call blame(checked, 'solver', 1, 'order', rule)
+      if (len(rule) > 0 .and. judge%is_sound('solver', 1, 'order')) call judge%blame('solver', 1, 'order', rule)
       if (.not. config%solver%fixed_step > 0.0_wp) return
       if (.not. any(config%solver%method == ['erk   ', 'dop853', 'gauss '])) then
-         call blame(checked, 'solver', 1, 'fixed_step', "is possible with method = 'erk', 'dop853' or 'gauss' only")
+         call judge%blame('solver', 1, 'fixed_step', "is possible with method = 'erk', 'dop853' or 'gauss' only")
       else if (config%t_end/config%solver%max_steps > config%solver%fixed_step) then
-         call blame(checked, 'solver', 1, 'fixed_step', 'would make more than max_steps = '// &
+         call judge%blame('solver', 1, 'fixed_step', 'would make more than max_steps = '// &
                     to_text(config%solver%max_steps)//' steps until t_end = '//short_text(config%t_end)//' [s]')
       end if
    end subroutine check_solver
@@ -285,47 +288,47 @@ contains
    end function order_rule
 
    !> A load on a node needs an existing node and is a force.
-   subroutine check_target(checked, i, load, n_rods)
-      type(checked_document), intent(inout) :: checked
+   subroutine check_target(judge, i, load, n_rods)
+      class(key_judge), intent(inout) :: judge
       integer, intent(in) :: i !! which load
       type(load_config), intent(in) :: load
       integer, intent(in) :: n_rods !! 0: not known
 
-      if (.not. is_sound(checked, 'load', i, 'target')) return
+      if (.not. judge%is_sound('load', i, 'target')) return
       if (load%target == 'spacecraft') then
-         if (.not. is_given(checked, 'load', i, 'node')) return
-         call blame(checked, 'load', i, 'node', "goes with target = 'node' only")
+         if (.not. judge%is_given('load', i, 'node')) return
+         call judge%blame('load', i, 'node', "goes with target = 'node' only")
          return
       end if
-      call require(checked, 'load', i, 'node', "when target = 'node'")
-      if (n_rods > 0 .and. load%node > n_rods) call blame(checked, 'load', i, 'node', no_such('node', 1, n_rods))
-      if (load%component /= 'M' .or. .not. is_sound(checked, 'load', i, 'component')) return
-      call blame(checked, 'load', i, 'component', &
+      call judge%require('load', i, 'node', "when target = 'node'")
+      if (n_rods > 0 .and. load%node > n_rods) call judge%blame('load', i, 'node', no_such('node', 1, n_rods))
+      if (load%component /= 'M' .or. .not. judge%is_sound('load', i, 'component')) return
+      call judge%blame('load', i, 'component', &
          "must be 'X' or 'Y' when target = 'node'; moments act on the spacecraft only")
    end subroutine check_target
 
    !> The load must not end before it begins, and a smooth step must fit in between.
-   subroutine check_times(checked, i, load)
-      type(checked_document), intent(inout) :: checked
+   subroutine check_times(judge, i, load)
+      class(key_judge), intent(inout) :: judge
       integer, intent(in) :: i
       type(load_config), intent(in) :: load
 
-      if (.not. (is_sound(checked, 'load', i, 't_start') .and. is_sound(checked, 'load', i, 't_end'))) return
-      if (.not. is_given(checked, 'load', i, 't_end') .and. .not. is_sound(checked, 'case', 1, 't_end')) return
+      if (.not. (judge%is_sound('load', i, 't_start') .and. judge%is_sound('load', i, 't_end'))) return
+      if (.not. judge%is_given('load', i, 't_end') .and. .not. judge%is_sound('case', 1, 't_end')) return
       if (load%t_start > load%t_end .and. .not. same_time(load%t_start, load%t_end)) then
-         if (is_given(checked, 'load', i, 't_start')) then
-            call blame(checked, 'load', i, 't_start', 'must not be after t_end = '//short_text(load%t_end)//' [s]')
+         if (judge%is_given('load', i, 't_start')) then
+            call judge%blame('load', i, 't_start', 'must not be after t_end = '//short_text(load%t_end)//' [s]')
          else
-            call blame(checked, 'load', i, 't_end', 'must not be before t_start = '//short_text(load%t_start)//' [s]')
+            call judge%blame('load', i, 't_end', 'must not be before t_start = '//short_text(load%t_start)//' [s]')
          end if
-      else if (load%law == 'smooth_step' .and. is_sound(checked, 'load', i, 'rise_time') .and. &
-               is_sound(checked, 'load', i, 'law')) then
+      else if (load%law == 'smooth_step' .and. judge%is_sound('load', i, 'rise_time') .and. &
+               judge%is_sound('load', i, 'law')) then
          if (load%t_start + load%rise_time > load%t_end .and. &
              .not. same_time(load%t_start + load%rise_time, load%t_end)) then
-            call blame(checked, 'load', i, 'rise_time', 'must not exceed t_end - t_start = ' &
+            call judge%blame('load', i, 'rise_time', 'must not exceed t_end - t_start = ' &
                //short_text(load%t_end - load%t_start)//' [s]')
          else if (.not. load%rise_time > 0.0_wp) then
-            call blame(checked, 'load', i, 'rise_time', 'must be positive, but t_end = t_start [s]')
+            call judge%blame('load', i, 'rise_time', 'must be positive, but t_end = t_start [s]')
          end if
       end if
    end subroutine check_times

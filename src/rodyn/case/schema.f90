@@ -9,7 +9,7 @@ module rodyn_schema
    public :: type_integer, type_real, type_logical, type_word, type_text
    public :: one_value, any_list
    public :: no_rule, positive, not_negative, at_least, in_range, between, up_to
-   public :: satisfies, rule_text, requirement, row_index, group_index, nearest_key, nearest_group, misspelt_key, &
+   public :: satisfies, rule_text, requirement, count_rule, row_index, group_index, nearest_key, nearest_group, misspelt_key, &
       misspelt_group
 
    !> Types of a key. A word is one of a fixed list; a text is free.
@@ -116,6 +116,15 @@ contains
       end select
       text = text//unit_text(row)
    end function requirement
+
+   !> How many values an array takes.
+   pure function count_rule(extent, wanted) result(text)
+      type(schema_extent), intent(in) :: extent
+      integer, intent(in) :: wanted !! values
+      character(len=:), allocatable :: text
+      text = 'takes one value'
+      if (wanted /= 1) text = 'takes 1 or '//to_text(wanted)//' values, one per '//trim(extent%name)
+   end function count_rule
 
    !> 'must be 'a', 'b' or 'c''
    pure function word_rule(words) result(text)

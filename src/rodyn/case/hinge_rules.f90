@@ -3,7 +3,7 @@ module rodyn_hinge_rules
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: case_config, hinge_config, kink_config, none_given
    use rodyn_case_fields, only: kink_law_takes
-   use rodyn_checked_document, only: checked_document, blame, is_given, is_sound, no_such
+   use rodyn_key_judge, only: key_judge, no_such
    use rodyn_law_rules, only: check_law_keys, check_table
    use rodyn_switch_times, only: same_time
    implicit none (type, external)
@@ -15,168 +15,168 @@ module rodyn_hinge_rules
 contains
 
    !> Note everything that is wrong with programs of kinks and laws of hinges.
-   subroutine check_moving_hinges(checked, config)
-      type(checked_document), intent(inout) :: checked
+   subroutine check_moving_hinges(judge, config)
+      class(key_judge), intent(inout) :: judge
       type(case_config), intent(in) :: config
       integer :: i, k
 
       do i = 1, size(config%kink_programs)
-         call check_exists(checked, 'kink_program', i, config%kink_programs(i)%hinge, config%chain%n_rods)
+         call check_exists(judge, 'kink_program', i, config%kink_programs(i)%hinge, config%chain%n_rods)
          associate (law => config%kink_programs(i)%law)
-            call check_law_keys(checked, 'kink_program', i, law, law_keys, &
+            call check_law_keys(judge, 'kink_program', i, law, law_keys, &
                                 [(kink_law_takes(law, trim(law_keys(k))), k=1, size(law_keys))], &
                                 law_keys /= 't_start' .and. law_keys /= 't_end')
          end associate
-         call check_program_times(checked, i, config%kink_programs(i))
-         call check_jumps(checked, i, config%kink_programs(i), config)
+         call check_program_times(judge, i, config%kink_programs(i))
+         call check_jumps(judge, i, config%kink_programs(i), config)
       end do
       do i = 1, size(config%hinges)
-         call check_exists(checked, 'hinge', i, config%hinges(i)%hinge, config%chain%n_rods)
-         call check_once(checked, i, config%hinges)
-         call check_release(checked, i, config%hinges)
-         call check_stops(checked, i, config%hinges(i))
-         call check_friction(checked, i, config%hinges(i))
-         call check_dampers(checked, i, config%hinges(i), config)
+         call check_exists(judge, 'hinge', i, config%hinges(i)%hinge, config%chain%n_rods)
+         call check_once(judge, i, config%hinges)
+         call check_release(judge, i, config%hinges)
+         call check_stops(judge, i, config%hinges(i))
+         call check_friction(judge, i, config%hinges(i))
+         call check_dampers(judge, i, config%hinges(i), config)
       end do
    end subroutine check_moving_hinges
 
    !> Hinges are numbered from 0; that a number is not negative stands in the table.
-   subroutine check_exists(checked, group, i, hinge, n_rods)
-      type(checked_document), intent(inout) :: checked
+   subroutine check_exists(judge, group, i, hinge, n_rods)
+      class(key_judge), intent(inout) :: judge
       character(len=*), intent(in) :: group
       integer, intent(in) :: i, hinge, n_rods !! n_rods 0: not known
       if (n_rods < 1 .or. hinge < n_rods) return
-      if (.not. is_sound(checked, group, i, 'hinge')) return
-      call blame(checked, group, i, 'hinge', no_such('hinge', 0, n_rods - 1))
+      if (.not. judge%is_sound(group, i, 'hinge')) return
+      call judge%blame(group, i, 'hinge', no_such('hinge', 0, n_rods - 1))
    end subroutine check_exists
 
    !> A program must not end before it begins; only a ramp may be a step. Tables have values at times that increase.
-   subroutine check_program_times(checked, i, program)
-      type(checked_document), intent(inout) :: checked
+   subroutine check_program_times(judge, i, program)
+      class(key_judge), intent(inout) :: judge
       integer, intent(in) :: i
       type(kink_config), intent(in) :: program
 
       if (program%law == 'table') then
-         call check_table(checked, 'kink_program', i, program%times, program%values, .true.)
+         call check_table(judge, 'kink_program', i, program%times, program%values, .true.)
          return
       end if
-      if (.not. (is_sound(checked, 'kink_program', i, 't_start') .and. is_sound(checked, 'kink_program', i, 't_end'))) return
+      if (.not. (judge%is_sound('kink_program', i, 't_start') .and. judge%is_sound('kink_program', i, 't_end'))) return
       if (program%t_start > program%t_end .and. .not. same_time(program%t_start, program%t_end)) then
-         call blame(checked, 'kink_program', i, 't_start', 'must not be after t_end')
+         call judge%blame('kink_program', i, 't_start', 'must not be after t_end')
       else if (same_time(program%t_start, program%t_end) .and. program%law /= 'ramp') then
-         call blame(checked, 'kink_program', i, 't_start', "must be before t_end; only law = 'ramp' may be a step")
+         call judge%blame('kink_program', i, 't_start', "must be before t_end; only law = 'ramp' may be a step")
       end if
    end subroutine check_program_times
 
    !> A kink that jumps would strike a damper or a lock with infinite force; so would one whose rate jumps a lock.
-   subroutine check_jumps(checked, i, program, config)
-      type(checked_document), intent(inout) :: checked
+   subroutine check_jumps(judge, i, program, config)
+      class(key_judge), intent(inout) :: judge
       integer, intent(in) :: i
       type(kink_config), intent(in) :: program
       type(case_config), intent(in) :: config
       logical :: step
       integer :: h
 
-      if (.not. is_sound(checked, 'kink_program', i, 'hinge') .or. .not. is_sound(checked, 'kink_program', i, 'law')) return
+      if (.not. judge%is_sound('kink_program', i, 'hinge') .or. .not. judge%is_sound('kink_program', i, 'law')) return
       step = program%law == 'ramp' .and. same_time(program%t_start, program%t_end)
-      if (step .and. is_sound(checked, 'chain', 1, 'hinge_damping') .and. &
+      if (step .and. judge%is_sound('chain', 1, 'hinge_damping') .and. &
           program%hinge < min(config%chain%n_rods, size(config%chain%hinge_damping))) then
-         if (config%chain%hinge_damping(program%hinge) > 0.0_wp) call blame(checked, 'kink_program', i, 'hinge', &
+         if (config%chain%hinge_damping(program%hinge) > 0.0_wp) call judge%blame('kink_program', i, 'hinge', &
             'a step of the kink needs a hinge without hinge_damping')
       end if
       do h = 1, size(config%hinges)
          associate (hinge => config%hinges(h))
             if (hinge%hinge /= program%hinge) cycle
-            if (step .and. max(hinge%stop_damping, hinge%lock_damping) > 0.0_wp) call blame(checked, 'kink_program', i, 'hinge', &
+            if (step .and. max(hinge%stop_damping, hinge%lock_damping) > 0.0_wp) call judge%blame('kink_program', i, 'hinge', &
                'a step of the kink needs a hinge without stop_damping and lock_damping')
             if (hinge%lock_stiffness > 0.0_wp .or. .not. (hinge%held .or. hinge%latch_angle < none_given)) cycle
-            if (program%law == 'ramp' .or. program%law == 'sine') call blame(checked, 'kink_program', i, 'law', &
+            if (program%law == 'ramp' .or. program%law == 'sine') call judge%blame('kink_program', i, 'law', &
                "must be 'smooth_step' or 'table' at a hinge that is held or latches: its rate must not jump")
          end associate
       end do
    end subroutine check_jumps
 
    !> One group for each hinge.
-   subroutine check_once(checked, i, hinges)
-      type(checked_document), intent(inout) :: checked
+   subroutine check_once(judge, i, hinges)
+      class(key_judge), intent(inout) :: judge
       integer, intent(in) :: i
       type(hinge_config), intent(in) :: hinges(:)
-      if (.not. is_sound(checked, 'hinge', i, 'hinge')) return
-      if (any(hinges(:i - 1)%hinge == hinges(i)%hinge)) call blame(checked, 'hinge', i, 'hinge', &
+      if (.not. judge%is_sound('hinge', i, 'hinge')) return
+      if (any(hinges(:i - 1)%hinge == hinges(i)%hinge)) call judge%blame('hinge', i, 'hinge', &
          'this hinge has a group &hinge already')
    end subroutine check_once
 
    !> Only what is held can be released, by one cause, and only what latches can release others.
-   subroutine check_release(checked, i, hinges)
-      type(checked_document), intent(inout) :: checked
+   subroutine check_release(judge, i, hinges)
+      class(key_judge), intent(inout) :: judge
       integer, intent(in) :: i
       type(hinge_config), intent(in) :: hinges(:)
       logical :: by_time, by_latch
       integer :: k
 
-      by_time = is_given(checked, 'hinge', i, 'release_time')
-      by_latch = is_given(checked, 'hinge', i, 'release_after')
-      if (is_sound(checked, 'hinge', i, 'held') .and. .not. hinges(i)%held) then
-         if (by_time) call blame(checked, 'hinge', i, 'release_time', 'goes with held = .true. only')
-         if (by_latch) call blame(checked, 'hinge', i, 'release_after', 'goes with held = .true. only')
+      by_time = judge%is_given('hinge', i, 'release_time')
+      by_latch = judge%is_given('hinge', i, 'release_after')
+      if (judge%is_sound('hinge', i, 'held') .and. .not. hinges(i)%held) then
+         if (by_time) call judge%blame('hinge', i, 'release_time', 'goes with held = .true. only')
+         if (by_latch) call judge%blame('hinge', i, 'release_after', 'goes with held = .true. only')
          return
       end if
-      if (by_time .and. by_latch) call blame(checked, 'hinge', i, 'release_after', 'excludes release_time')
-      if (.not. by_latch .or. .not. is_sound(checked, 'hinge', i, 'release_after')) return
+      if (by_time .and. by_latch) call judge%blame('hinge', i, 'release_after', 'excludes release_time')
+      if (.not. by_latch .or. .not. judge%is_sound('hinge', i, 'release_after')) return
       do k = 1, size(hinges)
          if (hinges(k)%hinge == hinges(i)%release_after .and. hinges(k)%latch_angle < none_given .and. k /= i) return
       end do
-      call blame(checked, 'hinge', i, 'release_after', 'that hinge must have a latch_angle of its own')
+      call judge%blame('hinge', i, 'release_after', 'that hinge must have a latch_angle of its own')
    end subroutine check_release
 
    !> Stops, freeplay and locks need their stiffnesses, and these need them.
-   subroutine check_stops(checked, i, hinge)
-      type(checked_document), intent(inout) :: checked
+   subroutine check_stops(judge, i, hinge)
+      class(key_judge), intent(inout) :: judge
       integer, intent(in) :: i
       type(hinge_config), intent(in) :: hinge
 
       if (hinge%lower_stop < none_given .and. hinge%upper_stop < none_given .and. hinge%lower_stop >= hinge%upper_stop) &
-         call blame(checked, 'hinge', i, 'upper_stop', 'must be greater than lower_stop')
+         call judge%blame('hinge', i, 'upper_stop', 'must be greater than lower_stop')
       if (min(hinge%lower_stop, hinge%upper_stop) < none_given) then
-         if (.not. hinge%stop_stiffness > 0.0_wp .and. is_sound(checked, 'hinge', i, 'stop_stiffness')) &
-            call blame(checked, 'hinge', i, 'stop_stiffness', 'is required with a stop, and positive')
+         if (.not. hinge%stop_stiffness > 0.0_wp .and. judge%is_sound('hinge', i, 'stop_stiffness')) &
+            call judge%blame('hinge', i, 'stop_stiffness', 'is required with a stop, and positive')
       else if (hinge%stop_stiffness > 0.0_wp .or. hinge%stop_damping > 0.0_wp) then
-         if (is_sound(checked, 'hinge', i, 'lower_stop') .and. is_sound(checked, 'hinge', i, 'upper_stop')) &
-            call blame(checked, 'hinge', i, 'stop_stiffness', 'goes with lower_stop or upper_stop only')
+         if (judge%is_sound('hinge', i, 'lower_stop') .and. judge%is_sound('hinge', i, 'upper_stop')) &
+            call judge%blame('hinge', i, 'stop_stiffness', 'goes with lower_stop or upper_stop only')
       end if
       if (hinge%freeplay_stiffness > 0.0_wp .and. .not. hinge%freeplay > 0.0_wp) &
-         call blame(checked, 'hinge', i, 'freeplay_stiffness', 'goes with freeplay only')
+         call judge%blame('hinge', i, 'freeplay_stiffness', 'goes with freeplay only')
       if (hinge%lock_damping > 0.0_wp .and. .not. hinge%lock_stiffness > 0.0_wp) &
-         call blame(checked, 'hinge', i, 'lock_damping', 'goes with lock_stiffness only')
+         call judge%blame('hinge', i, 'lock_damping', 'goes with lock_stiffness only')
    end subroutine check_stops
 
    !> Moment and velocity of dry friction go together.
-   subroutine check_friction(checked, i, hinge)
-      type(checked_document), intent(inout) :: checked
+   subroutine check_friction(judge, i, hinge)
+      class(key_judge), intent(inout) :: judge
       integer, intent(in) :: i
       type(hinge_config), intent(in) :: hinge
 
-      if (.not. (is_sound(checked, 'hinge', i, 'friction_moment') .and. &
-                 is_sound(checked, 'hinge', i, 'friction_velocity'))) return
+      if (.not. (judge%is_sound('hinge', i, 'friction_moment') .and. &
+                 judge%is_sound('hinge', i, 'friction_velocity'))) return
       if (hinge%friction_moment > 0.0_wp .and. .not. hinge%friction_velocity > 0.0_wp) then
-         call blame(checked, 'hinge', i, 'friction_velocity', 'is required when friction_moment > 0')
+         call judge%blame('hinge', i, 'friction_velocity', 'is required when friction_moment > 0')
       else if (hinge%friction_velocity > 0.0_wp .and. .not. hinge%friction_moment > 0.0_wp) then
-         call blame(checked, 'hinge', i, 'friction_velocity', 'goes with friction_moment only')
+         call judge%blame('hinge', i, 'friction_velocity', 'goes with friction_moment only')
       end if
    end subroutine check_friction
 
    !> Exact dampers make a state of the rotation of each damped hinge. Damping must not come and go there.
-   subroutine check_dampers(checked, i, hinge, config)
-      type(checked_document), intent(inout) :: checked
+   subroutine check_dampers(judge, i, hinge, config)
+      class(key_judge), intent(inout) :: judge
       integer, intent(in) :: i
       type(hinge_config), intent(in) :: hinge
       type(case_config), intent(in) :: config
 
       if (config%model%bending /= 'quasistatic' .or. config%model%dampers /= 'exact') return
       if (.not. max(hinge%stop_damping, hinge%lock_damping, hinge%friction_moment) > 0.0_wp) return
-      if (.not. is_sound(checked, 'chain', 1, 'hinge_damping')) return
-      if (hinge%hinge >= min(config%chain%n_rods, size(config%chain%hinge_damping))) return
-      if (.not. config%chain%hinge_damping(hinge%hinge) > 0.0_wp) call blame(checked, 'hinge', i, 'hinge', &
+      if (.not. judge%is_sound('chain', 1, 'hinge_damping')) return
+      if (hinge%hinge < 0 .or. hinge%hinge >= min(config%chain%n_rods, size(config%chain%hinge_damping))) return
+      if (.not. config%chain%hinge_damping(hinge%hinge) > 0.0_wp) call judge%blame('hinge', i, 'hinge', &
          "with dampers = 'exact', stop_damping, lock_damping and friction_moment need a hinge with hinge_damping")
    end subroutine check_dampers
 

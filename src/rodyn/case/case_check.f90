@@ -1,0 +1,499 @@
+!> A case made in memory, held against the rules that a case file is held against: the table (`rodyn_case_schema`) and
+!> what ties keys together (`rodyn_case_rules`), in the same words. What is left out gets its default as in a file:
+!> arrays that are not allocated, and whatever still has the initial value of its type.
+module rodyn_case_check
+   use rodyn_kinds, only: wp
+   use rodyn_case_config, only: case_config, hinge_config, kink_config, load_config, profile_config, name_length, none_given
+   use rodyn_case_fields, only: visit_case, law_takes, kink_law_takes
+   use rodyn_case_rules, only: check_case
+   use rodyn_case_schema, only: case_extents, case_rows
+   use rodyn_case_values, only: list_text, plain_text, value_shown
+   use rodyn_errors, only: error_type
+   use rodyn_faults, only: fault_list
+   use rodyn_field_visitor, only: field_visitor
+   use rodyn_key_judge, only: key_judge
+   use rodyn_schema, only: any_list, requirement, row_index, rule_text, satisfies, schema_extent, up_to, count_rule
+   use rodyn_text, only: printable, quoted, to_text, word, word_count
+   implicit none (type, external)
+   private
+   public :: sound_case, complete_case
+
+   !> Where a fault was found: no rule that needs this key is applied then.
+   type :: unsound_key
+      character(len=16) :: group = ''
+      character(len=24) :: key = ''
+      integer :: instance = 1
+   end type unsound_key
+
+   !> Faults of a case.
+   type, extends(key_judge) :: case_judge
+      type(case_config), pointer :: config => null()
+      type(fault_list) :: faults
+      type(unsound_key), allocatable :: unsound(:) !! not allocated: none
+   contains
+      procedure :: is_given
+      procedure :: is_sound
+      procedure :: blame
+   end type case_judge
+
+   !> Holds each value against its row of the table.
+   type, extends(field_visitor) :: value_checker
+      type(case_judge), pointer :: judge => null()
+      type(schema_extent) :: extents(3)
+      character(len=16) :: group = ''
+      integer :: instance = 1
+      integer :: row = 0 !! the row visited last; rows are visited in the order of the table
+   contains
+      procedure :: open_group
+      procedure :: close_group
+      procedure :: real_field
+      procedure :: array_field
+      procedure :: integer_field
+      procedure :: logical_field
+      procedure :: word_field
+      procedure :: text_field
+   end type value_checker
+
+contains
+
+   !> A copy of a case with everything that was left out; an error, exit code 2, that tells all its faults.
+   subroutine sound_case(given, config, error)
+      type(case_config), intent(in) :: given
+      type(case_config), target, intent(out) :: config
+      type(error_type), allocatable, intent(out) :: error
+      type(case_judge), target :: judge
+      type(value_checker) :: checker
+      integer :: n
+
+      config = given
+      if (.not. allocated(config%profiles)) allocate (config%profiles(0))
+      if (.not. allocated(config%loads)) allocate (config%loads(0))
+      if (.not. allocated(config%kink_programs)) allocate (config%kink_programs(0))
+      if (.not. allocated(config%hinges)) allocate (config%hinges(0))
+      call complete_case(config)
+      judge%config => config
+      checker%judge => judge
+      n = config%chain%n_rods
+      if (.not. satisfies(case_rows(row_index(case_rows, 'chain', 'n_rods')), real(n, wp))) n = 0
+      checker%extents = case_extents(n)
+      call visit_case(checker, config)
+      call check_case(judge, config)
+      call judge%faults%to_error('', error)
+   end subroutine sound_case
+
+   !> Defaults that come from other keys. A table of a kink has its own times.
+   subroutine complete_case(config)
+      type(case_config), intent(inout) :: config !! lists allocated
+      integer :: i
+
+      do i = 1, size(config%profiles)
+         if (config%profiles(i)%last_rod == huge(1)) config%profiles(i)%last_rod = config%chain%n_rods
+      end do
+      do i = 1, size(config%loads)
+         associate (load => config%loads(i))
+            if (is_none(load%t_end)) load%t_end = config%t_end
+            if (load%law == 'smooth_step' .and. is_unset(load%rise_time)) load%rise_time = load%t_end - load%t_start
+         end associate
+      end do
+      do i = 1, size(config%kink_programs)
+         associate (program => config%kink_programs(i))
+            if (program%law /= 'table' .and. is_none(program%t_end)) program%t_end = config%t_end
+         end associate
+      end do
+   end subroutine complete_case
+
+   !> Does a number still have the initial value of its type?
+   elemental logical function is_unset(x)
+      real(wp), intent(in) :: x
+      is_unset = abs(x) <= 0.0_wp .or. is_none(x)
+   end function is_unset
+
+   !> Is it the initial value of an angle or a time that a case need not have? An infinite one is not.
+   elemental logical function is_none(x)
+      real(wp), intent(in) :: x
+      is_none = x >= none_given .and. x <= none_given
+   end function is_none
+
+   !> Does the case give the key? Only the keys that rules ask for.
+   logical function is_given(self, group, instance, key) result(given)
+      class(case_judge), intent(in) :: self
+      character(len=*), intent(in) :: group, key
+      integer, intent(in) :: instance
+
+      given = .true.
+      associate (c => self%config)
+         select case (group)
+         case ('spacecraft')
+            if (key == 'mass') given = .not. is_unset(c%spacecraft%mass)
+            if (key == 'inertia') given = .not. is_unset(c%spacecraft%inertia)
+         case ('chain')
+            if (key == 'mass_per_length') given = has_values(c%chain%mass_per_length)
+            if (key == 'bending_stiffness') given = has_values(c%chain%bending_stiffness)
+         case ('model')
+            if (key == 'bending') given = c%model%bending /= 'dynamic'
+         case ('rod_profile')
+            given = profile_gives(c%profiles(instance), key)
+         case ('load')
+            given = load_gives(c%loads(instance), key)
+         case ('kink_program')
+            given = program_gives(c%kink_programs(instance), key)
+         case ('hinge')
+            given = hinge_gives(c%hinges(instance), key)
+         end select
+      end associate
+   end function is_given
+
+   pure logical function has_values(x)
+      real(wp), allocatable, intent(in) :: x(:)
+      has_values = .false.
+      if (allocated(x)) has_values = size(x) > 0
+   end function has_values
+
+   pure logical function profile_gives(profile, key) result(given)
+      type(profile_config), intent(in) :: profile
+      character(len=*), intent(in) :: key
+      select case (key)
+      case ('polynomial')
+         given = has_values(profile%polynomial)
+      case ('positions')
+         given = has_values(profile%positions)
+      case ('values')
+         given = has_values(profile%values)
+      case default
+         given = .true.
+      end select
+   end function profile_gives
+
+   !> A number that the law takes is given whatever it is; another one if it is not zero.
+   pure logical function load_gives(load, key) result(given)
+      type(load_config), intent(in) :: load
+      character(len=*), intent(in) :: key
+      select case (key)
+      case ('node')
+         given = load%node /= 0
+      case ('t_start')
+         given = .not. is_unset(load%t_start)
+      case ('value')
+         given = law_takes(load%law, key) .or. .not. is_unset(load%value)
+      case ('rate')
+         given = law_takes(load%law, key) .or. .not. is_unset(load%rate)
+      case ('rise_time')
+         given = .not. is_unset(load%rise_time)
+      case ('times')
+         given = has_values(load%times)
+      case ('values')
+         given = has_values(load%values)
+      case ('component')
+         given = load%component /= 'M'
+      case ('after')
+         given = load%after /= 'zero'
+      case default
+         given = .true.
+      end select
+   end function load_gives
+
+   pure logical function program_gives(program, key) result(given)
+      type(kink_config), intent(in) :: program
+      character(len=*), intent(in) :: key
+      select case (key)
+      case ('t_start')
+         given = .not. is_unset(program%t_start)
+      case ('t_end')
+         given = .not. is_none(program%t_end)
+      case ('value')
+         given = kink_law_takes(program%law, key) .or. .not. is_unset(program%value)
+      case ('rate')
+         given = kink_law_takes(program%law, key) .or. .not. is_unset(program%rate)
+      case ('times')
+         given = has_values(program%times)
+      case ('values')
+         given = has_values(program%values)
+      case default
+         given = .true.
+      end select
+   end function program_gives
+
+   pure logical function hinge_gives(hinge, key) result(given)
+      type(hinge_config), intent(in) :: hinge
+      character(len=*), intent(in) :: key
+      select case (key)
+      case ('release_time')
+         given = .not. is_none(hinge%release_time)
+      case ('release_after')
+         given = hinge%release_after /= -1
+      case ('stop_stiffness')
+         given = .not. is_unset(hinge%stop_stiffness)
+      case ('friction_velocity')
+         given = .not. is_unset(hinge%friction_velocity)
+      case default
+         given = .true.
+      end select
+   end function hinge_gives
+
+   logical function is_sound(self, group, instance, key) result(sound)
+      class(case_judge), intent(in) :: self
+      character(len=*), intent(in) :: group, key
+      integer, intent(in) :: instance
+      sound = .true.
+      if (allocated(self%unsound)) sound = .not. any(self%unsound%group == group .and. self%unsound%key == key .and. &
+                                                      self%unsound%instance == instance)
+   end function is_sound
+
+   !> Note a fault: '&group key = value: rule'.
+   subroutine blame(self, group, instance, key, rule)
+      class(case_judge), intent(inout) :: self
+      character(len=*), intent(in) :: group, key, rule
+      integer, intent(in) :: instance
+
+      if (self%faults%full()) then
+         call self%faults%add(0, '') ! only counted
+      else if (.not. self%is_given(group, instance, key)) then
+         call self%faults%add(0, name_of(group, instance)//' '//key//': '//rule)
+      else
+         call self%faults%add(0, name_of(group, instance)//' '//key//value_shown(self%config, group, instance, key)//': '//rule)
+      end if
+   end subroutine blame
+
+   !> '&load', and from the second on '&load(2)', as an axis of a sweep has it.
+   pure function name_of(group, instance) result(name)
+      character(len=*), intent(in) :: group
+      integer, intent(in) :: instance
+      character(len=:), allocatable :: name
+      name = '&'//trim(group)
+      if (instance > 1) name = name//'('//to_text(instance)//')'
+   end function name_of
+
+   !> Note a fault of a value itself.
+   subroutine reject(self, where, value, rule)
+      class(value_checker), intent(inout) :: self
+      character(len=*), intent(in) :: where !! index in parentheses, or nothing
+      character(len=*), intent(in) :: value !! ' = value', or nothing
+      character(len=*), intent(in) :: rule
+
+      associate (judge => self%judge, key => case_rows(self%row)%key)
+         call judge%faults%add(0, name_of(self%group, self%instance)//' '//trim(key)//where//value//': '//rule)
+         if (.not. allocated(judge%unsound)) allocate (judge%unsound(0))
+         if (judge%is_sound(trim(self%group), self%instance, trim(key))) &
+            judge%unsound = [judge%unsound, unsound_key(self%group, key, self%instance)]
+      end associate
+   end subroutine reject
+
+   subroutine open_group(self, group, instance)
+      class(value_checker), intent(inout) :: self
+      character(len=*), intent(in) :: group
+      integer, intent(in) :: instance
+      integer :: r
+
+      self%group = group
+      self%instance = instance
+      r = min(self%row + 1, size(case_rows))
+      if (case_rows(r)%group /= group .or. case_rows(max(1, self%row))%group == group) then
+         do r = 1, size(case_rows)
+            if (case_rows(r)%group == group) exit
+         end do
+      end if
+      self%row = r - 1
+   end subroutine open_group
+
+   subroutine close_group(self)
+      class(value_checker), intent(inout) :: self
+      associate (unused => self); end associate
+   end subroutine close_group
+
+   !> Go to the row of a key.
+   subroutine find(self, key)
+      class(value_checker), intent(inout) :: self
+      character(len=*), intent(in) :: key
+      self%row = self%row + 1
+      do while (case_rows(self%row)%key /= key)
+         self%row = self%row + 1
+      end do
+   end subroutine find
+
+   !> The rule that a number breaks, in words; empty if it breaks none.
+   pure function broken_rule(row, x) result(rule)
+      integer, intent(in) :: row
+      real(wp), intent(in) :: x
+      character(len=:), allocatable :: rule
+      rule = ''
+      if (.not. abs(x) <= huge(x)) then
+         rule = 'must be finite'
+      else if (.not. satisfies(case_rows(row), x)) then
+         rule = rule_text(case_rows(row))
+      end if
+   end function broken_rule
+
+   !> May a number be passed over, because it keeps its rule or was not given?
+   pure logical function passes(row, x)
+      integer, intent(in) :: row
+      real(wp), intent(in) :: x
+      passes = .false.
+      if (abs(x) <= huge(x)) passes = satisfies(case_rows(row), x)
+      if (.not. passes) passes = case_rows(row)%default == 'depends' .and. is_unset(x)
+   end function passes
+
+   subroutine real_field(self, key, x)
+      class(value_checker), intent(inout) :: self
+      character(len=*), intent(in) :: key
+      real(wp), intent(inout) :: x
+      call find(self, key)
+      if (.not. passes(self%row, x)) call reject(self, '', ' = '//plain_text(x), broken_rule(self%row, x))
+   end subroutine real_field
+
+   subroutine integer_field(self, key, x)
+      class(value_checker), intent(inout) :: self
+      character(len=*), intent(in) :: key
+      integer, intent(inout) :: x
+      integer :: none
+
+      call find(self, key)
+      if (satisfies(case_rows(self%row), real(x, wp))) return
+      none = huge(1) ! initial values of the types
+      if (key == 'node') none = 0
+      if (key == 'release_after') none = -1
+      if (case_rows(self%row)%default == 'depends' .and. x == none) return
+      call reject(self, '', ' = '//to_text(x), rule_text(case_rows(self%row)))
+   end subroutine integer_field
+
+   !> An array is as long as what it runs over, and begins there: it may come with other bounds. Each stretch of equal wrong
+   !> values is one fault.
+   subroutine array_field(self, key, x)
+      class(value_checker), intent(inout) :: self
+      character(len=*), intent(in) :: key
+      real(wp), allocatable, intent(inout) :: x(:)
+      integer :: lower
+
+      call find(self, key)
+      associate (row => case_rows(self%row))
+         lower = 1
+         if (row%extent /= any_list) lower = self%extents(row%extent)%lower
+         if (has_values(x) .and. row%default == 'depends' .and. row%extent /= any_list) then
+            if (all(is_unset(x))) deallocate (x) ! stiffnesses of rigid rods
+         end if
+         if (.not. has_values(x)) then
+            call leave_out(self, x)
+            return
+         end if
+         if (lbound(x, 1) /= lower) call shift(x, lower)
+         if (row%extent /= any_list) then
+            associate (wanted => self%extents(row%extent)%count)
+               if (wanted > 0 .and. size(x) /= wanted) then
+                  if (size(x) == 1) then ! in a file it would stand for all
+                     call reject(self, '', ' = '//list_text(x, .true.), 'must be allocated to '//to_text(wanted)//' values')
+                  else
+                     call reject(self, '', ' = '//list_text(x, .true.), &
+                                 count_rule(self%extents(row%extent), wanted)//', not '//to_text(size(x)))
+                  end if
+                  return
+               end if
+            end associate
+         end if
+      end associate
+      call check_values(self, x, lower)
+   end subroutine array_field
+
+   subroutine check_values(self, x, lower)
+      class(value_checker), intent(inout) :: self
+      real(wp), intent(in) :: x(:)
+      integer, intent(in) :: lower !! index of the first
+      character(len=:), allocatable :: where
+      integer :: first, last
+
+      last = 0
+      do while (last < size(x) .and. .not. self%judge%faults%full())
+         first = last + 1
+         last = first
+         if (passes_rule(x(first))) cycle
+         do while (last < size(x))
+            if (.not. abs(x(last + 1) - x(first)) <= 0.0_wp) exit
+            last = last + 1
+         end do
+         where = '('//to_text(lower + first - 1)//')'
+         if (last - first + 1 == size(x)) where = '' ! all of them
+         call reject(self, where, ' = '//plain_text(x(first)), broken_rule(self%row, x(first)))
+      end do
+
+   contains
+
+      pure logical function passes_rule(value)
+         real(wp), intent(in) :: value
+         passes_rule = .false.
+         if (abs(value) <= huge(value)) passes_rule = satisfies(case_rows(self%row), value)
+      end function passes_rule
+
+   end subroutine check_values
+
+   !> The default of an array that was left out, if there is one.
+   subroutine leave_out(self, x)
+      class(value_checker), intent(inout) :: self
+      real(wp), allocatable, intent(inout) :: x(:)
+      real(wp) :: default
+
+      if (allocated(x)) deallocate (x)
+      associate (row => case_rows(self%row))
+         if (row%extent == any_list) then
+            allocate (x(0))
+         else if (row%default == 'required') then
+            call reject(self, '', '', 'is required')
+         else
+            default = 0.0_wp
+            if (row%default /= '0.0' .and. row%default /= 'depends') read (row%default, *) default
+            associate (range => self%extents(row%extent))
+               if (row%default == 'depends') then
+                  allocate (x(range%lower:range%lower - 1))
+               else
+                  allocate (x(range%lower:range%lower + range%count - 1), source=default)
+               end if
+            end associate
+         end if
+      end associate
+   end subroutine leave_out
+
+   !> Another first index.
+   subroutine shift(x, lower)
+      real(wp), allocatable, intent(inout) :: x(:)
+      integer, intent(in) :: lower
+      real(wp), allocatable :: copy(:)
+      allocate (copy(lower:lower + size(x) - 1))
+      copy(:) = x
+      call move_alloc(copy, x)
+   end subroutine shift
+
+   subroutine logical_field(self, key, x)
+      class(value_checker), intent(inout) :: self
+      character(len=*), intent(in) :: key
+      logical, intent(inout) :: x
+      associate (unused => x); end associate
+      call find(self, key)
+   end subroutine logical_field
+
+   !> Words are spelt as in the table; the reader of a file sees to that.
+   subroutine word_field(self, key, x)
+      class(value_checker), intent(inout) :: self
+      character(len=*), intent(in) :: key
+      character(len=name_length), intent(inout) :: x
+      integer :: k
+
+      call find(self, key)
+      associate (words => case_rows(self%row)%words)
+         do k = 1, word_count(words)
+            if (x == word(words, k)) return
+         end do
+      end associate
+      call reject(self, '', ' = '//printable(quoted(trim(x)), 60), requirement(case_rows(self%row)))
+   end subroutine word_field
+
+   subroutine text_field(self, key, x)
+      class(value_checker), intent(inout) :: self
+      character(len=*), intent(in) :: key
+      character(len=:), allocatable, intent(inout) :: x
+
+      call find(self, key)
+      if (.not. allocated(x)) then
+         x = ''
+      else if (case_rows(self%row)%rule == up_to .and. len(x) > nint(case_rows(self%row)%high)) then
+         call reject(self, '', ' = '//printable(quoted(x), 60), rule_text(case_rows(self%row)))
+      end if
+   end subroutine text_field
+
+end module rodyn_case_check
