@@ -84,8 +84,9 @@ contains
             if (uniform(0.0_wp, 1.0_wp) < 0.6_wp) hinge%lower_stop = uniform(-0.4_wp, 0.0_wp)
             if (uniform(0.0_wp, 1.0_wp) < 0.6_wp) hinge%upper_stop = uniform(0.0_wp, 0.4_wp)
             hinge%stop_stiffness = 10.0_wp**uniform(1.0_wp, 5.0_wp)
+            if (min(hinge%lower_stop, hinge%upper_stop) >= none_given) hinge%stop_stiffness = 0.0_wp
             hinge%held = uniform(0.0_wp, 1.0_wp) < 0.4_wp
-            hinge%release_time = 0.5_wp
+            if (hinge%held) hinge%release_time = 0.5_wp
          end associate
       end do
    end subroutine random_rods
@@ -375,6 +376,7 @@ contains
             config%initial%phi_rate(k) = uniform(-2.0_wp, 2.0_wp)
             if (config%hinges(k)%held) config%initial%phi_rate(k) = sum(config%initial%phi_rate(max(1, k - 1):k - 1))
             config%hinges(k)%stop_damping = max(0.0_wp, uniform(-1.0_wp, 2.0_wp))
+            if (.not. config%hinges(k)%stop_stiffness > 0.0_wp) config%hinges(k)%stop_damping = 0.0_wp
             if (uniform(0.0_wp, 1.0_wp) < 0.5_wp) cycle
             config%hinges(k)%friction_moment = 10.0_wp**uniform(-1.0_wp, 2.0_wp)
             config%hinges(k)%friction_velocity = 10.0_wp**uniform(-3.0_wp, 0.0_wp)
@@ -523,9 +525,11 @@ contains
          select case (i)
          case (2)
             program%law = 'table'
+            program%value = 0.0_wp
             program%times = [-1.0_wp, 1.0_wp]
             program%values = [0.3_wp, 0.3_wp]
          case (3)
+            deallocate (program%times, program%values)
             program%t_start = -2.0_wp
             program%t_end = -1.0_wp
          case (4) ! 0.3 rad at t = 0, and hardly more at 0.02 s
