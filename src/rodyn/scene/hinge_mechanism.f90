@@ -180,7 +180,8 @@ contains
          if (self%touches(i)) then
             margin = push(self, i, theta, theta_rate)
          else
-            margin = face_depth(self, i, t) - depth(self, i, theta)
+            ! Where a stop has just been left, both bodies move alike to first order; but what would pull does not touch.
+            margin = max(face_depth(self, i, t) - depth(self, i, theta), -push(self, i, theta, theta_rate))
          end if
       case (part_friction)
          if (self%slides == 0) then
