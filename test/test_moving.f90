@@ -490,8 +490,8 @@ contains
       call check(error, rate < 0.0_wp .and. depth > 0.0_wp, 'the closed form is not the one meant')
    end subroutine test_damped_stop
 
-   !> A rod with friction falls on a damped stop and creeps away from it, 11 events; three rods on three stops, 60 events. Errors of the
-   !> first steps after an event, of order one, are larger than what is left between the rod and the face of the stop it leaves.
+   !> A rod with friction falls on a damped stop and creeps away from it, 11 events; three rods on three stops, 60 events. Errors
+   !> of the first steps after an event, of order one, are larger than what is between the rod and the face of the stop it leaves.
    subroutine test_left_stop(error)
       type(error_type), allocatable, intent(out) :: error
       type(case_config) :: config

@@ -187,7 +187,7 @@ module rodyn_case_schema
       schema_row('hinge', 'friction_velocity', type_real, unit='rad/s', default='depends', rule=positive, &
          when='required when friction_moment > 0', help='rate up to which friction grows linearly'), &
       schema_row('solver', 'method', type_word, default="'auto'", words='auto|adams|bdf|erk|dop853|gauss', &
-         help='auto chooses from the scene; adams, bdf: CVODE; erk: ARKODE; dop853, gauss: our own, orders 8 and 16'), &
+         help='auto chooses; gauss, dop853: our own, orders 16 and 8; erk: ARKODE; adams, bdf: CVODE, errors add up'), &
       schema_row('solver', 'rtol', type_real, default='1.0e-8', rule=between, low=0.0_wp, high=1.0_wp, &
          help='relative tolerance'), &
       schema_row('solver', 'atol', type_real, default='1.0e-10', rule=positive, &

@@ -1,4 +1,5 @@
-!> What is allowed in a case but hardly meant: loads that never act, releases that never come, angles in degrees.
+!> What is allowed in a case but hardly meant: loads that never act, releases that never come, angles in degrees; and methods whose
+!> errors are not what the tolerances seem to say.
 module rodyn_case_notes
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: case_config, none_given
@@ -20,8 +21,22 @@ contains
 
       text = ''
       if (runs) call note_idle(config, text)
+      if (runs) call note_method(config, text)
       call note_degrees(config, text)
    end function case_notes
+
+   !> Multistep methods in a chain that vibrates (docs/stability.md, "Multistep methods add up").
+   subroutine note_method(config, text)
+      type(case_config), intent(in) :: config
+      character(len=:), allocatable, intent(inout) :: text
+      logical :: vibrates
+
+      if (config%solver%method /= 'adams' .and. config%solver%method /= 'bdf') return
+      vibrates = config%model%bending == 'dynamic'
+      if (allocated(config%chain%hinge_stiffness)) vibrates = vibrates .or. any(config%chain%hinge_stiffness > 0.0_wp)
+      if (vibrates) call add(text, "method '"//trim(config%solver%method)//"': its errors add up from period to period of a "// &
+                             'vibration, to hundreds of rtol in a thousand; a smaller rtol shows them')
+   end subroutine note_method
 
    subroutine add(text, note)
       character(len=:), allocatable, intent(inout) :: text
