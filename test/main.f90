@@ -1,4 +1,5 @@
-!> The test program: `tester [filter]` runs every test whose name contains the filter, `tester '!filter'` every other.
+!> The test program: `tester [--all] [filter]` runs every test whose name contains the filter, `tester '!filter'` every other.
+!> Tests that take long run with --all, or when a filter is given.
 program tester
    use test_testing, only: run_suite, suite_tally, unittest
    use test_article, only: collect_article
@@ -48,9 +49,12 @@ program tester
 
    type(suite_tally) :: tally
    character(len=200) :: filter
+   logical :: all
 
    filter = ''
    if (command_argument_count() > 0) call get_command_argument(1, filter)
+   all = filter /= '' ! a filter, or --all
+   if (filter == '--all') call get_command_argument(2, filter)
 
    call run('quadrature', collect_quadrature)
    call run('rod_profiles', collect_rod_profiles)
@@ -98,7 +102,7 @@ contains
       procedure(collect_interface) :: collect
       type(unittest), allocatable :: suite(:)
       call collect(suite)
-      call run_suite(name, suite, tally, trim(filter))
+      call run_suite(name, suite, tally, trim(filter), all)
    end subroutine run
 
 end program tester

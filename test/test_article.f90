@@ -16,7 +16,7 @@ contains
 
    subroutine collect_article(suite)
       type(unittest), allocatable, intent(out) :: suite(:)
-      suite = [new_test('table 1: phi_4 and alpha_1'' at 1, 2 and 30 s by adams', test_tables), &
+      suite = [new_test('table 1: phi_4 and alpha_1'' at 1, 2 and 30 s by adams', test_tables, long=.true.), &
                new_test('table 1: phi_4 and alpha_1'' at 1 and 2 s by erk, dop853 and gauss', test_explicit), &
                new_test('table 1: phi_4 and alpha_1'' at 1 s by bdf and the assembled kernel', test_bdf), &
                new_test('table 1 with the consistent formulation', test_consistent), &

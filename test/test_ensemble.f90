@@ -63,9 +63,9 @@ contains
 
    subroutine collect_ensemble(suite)
       type(unittest), allocatable, intent(out) :: suite(:)
-      suite = [new_test('cases of every kind in lanes move as they do one by one', test_kinds), &
+      suite = [new_test('cases of every kind in lanes move as they do one by one', test_kinds, long=.true.), &
                new_test('the steps in lanes are those of dop853', test_counts), &
-               new_test('order, companions and lanes change no bit', test_order), &
+               new_test('order, companions and lanes change no bit', test_order, long=.true.), &
                new_test('cases that fail say so and disturb nobody', test_failures), &
                new_test('max_step and max_steps hold in each lane', test_limits), &
                new_test('a case that takes too long is ended, the others are not', test_time_limit), &

@@ -35,7 +35,7 @@ contains
       type(unittest), allocatable, intent(out) :: suite(:)
       suite = [ &
          new_test('collocation matrices integrate, interpolate and have the right functions', test_matrices), &
-         new_test('every kind of scene moves as by dop853', test_kinds), &
+         new_test('every kind of scene moves as by dop853', test_kinds, long=.true.), &
          new_test('fixed steps show order 16', test_order), &
          new_test('the error follows the tolerance over nine decades', test_tolerance), &
          new_test('large fixed steps keep the energy for thousands of periods', test_energy), &

@@ -21,10 +21,10 @@ contains
 
    subroutine collect_invariants(suite)
       type(unittest), allocatable, intent(out) :: suite(:)
-      suite = [new_test('free flight for 100 periods keeps momenta and energy', test_free_flight), &
+      suite = [new_test('free flight for 100 periods keeps momenta and energy', test_free_flight, long=.true.), &
                new_test('ledger balances to 1e-9 under loads, damping and kinks', test_ledger), &
-               new_test('a mirrored scene gives the mirrored motion', test_mirror), &
-               new_test('a scene turned within the spacecraft gives the turned motion', test_turn), &
+               new_test('a mirrored scene gives the mirrored motion', test_mirror, long=.true.), &
+               new_test('a scene turned within the spacecraft gives the turned motion', test_turn, long=.true.), &
                new_test('exact dampers of quasistatic rods tend to reduced ones like D^2', test_exact_dampers), &
                new_test('a strongly damped massless rod decays as its closed form', test_relaxation), &
                new_test('stiffer rods tend to rigid rods, like 1/EI', test_rigid_limit), &

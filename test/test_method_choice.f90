@@ -38,7 +38,7 @@ contains
       suite = [new_test('power iteration misses the fastest rates by a fifth in one of 500 scenes at most', test_fastest), &
                new_test('auto costs at most 1.5 times the best method, soft and stiff, damped and not', test_few), &
                new_test('auto takes a method within 1.5 of the best in the scenes of the benchmark, or within 1.75 in one', &
-                        test_benchmark), &
+                        test_benchmark, long=.true.), &
                new_test('auto takes a method within 1.5 of the best in all but 3 of 24 scenes beside them, within 2.5 there', &
                         test_others)]
    end subroutine collect_method_choice

@@ -19,6 +19,7 @@ module test_testing
    type :: unittest
       character(len=160) :: name = '' !! what holds, in words; an allocatable one would leak from array constructors (gfortran 12)
       procedure(test_interface), pointer, nopass :: test => null()
+      logical :: long = .false.      !! takes many seconds in the debug build: only with --all
    end type unittest
 
    type :: suite_tally
@@ -42,24 +43,28 @@ module test_testing
 contains
 
    !> One entry of a suite.
-   function new_test(name, test) result(entry)
+   function new_test(name, test, long) result(entry)
       character(len=*), intent(in) :: name
       procedure(test_interface) :: test
+      logical, intent(in), optional :: long !! see `unittest`
       type(unittest) :: entry
       entry%name = name
       entry%test => test
+      if (present(long)) entry%long = long
    end function new_test
 
    !> Run the tests of a suite that the filter chooses, print each, and add to the tally.
-   subroutine run_suite(suite_name, suite, tally, filter)
+   subroutine run_suite(suite_name, suite, tally, filter, all)
       character(len=*), intent(in) :: suite_name
       type(unittest), intent(in) :: suite(:)
       type(suite_tally), intent(inout) :: tally
       character(len=*), intent(in) :: filter !! see `chosen`
+      logical, intent(in) :: all !! also those that take long
       type(error_type), allocatable :: error
       integer :: i
 
       do i = 1, size(suite)
+         if (suite(i)%long .and. .not. all) cycle
          if (.not. chosen(trim(suite(i)%name), filter)) cycle
          call suite(i)%test(error)
          if (allocated(error)) then
