@@ -246,7 +246,7 @@ contains
       integer :: last
 
       s%at = first + max(1, span(document%text(first:), ends_token))
-      if (document%text(first:s%at) == '//') s%at = s%at + 1
+      if (document%text(first:min(len(document%text), s%at)) == '//') s%at = s%at + 1
       last = s%at - 1
       do while (s%at <= len(document%text))
          if (index(' ,'//tab, document%text(s%at:s%at)) > 0) then

@@ -139,11 +139,13 @@ contains
       integer, intent(out) :: member
       type(verdict_type) :: verdict
       real(wp) :: t_until
+      logical :: out(size(candidates))
       integer :: i
 
       t_until = min(self%t_end, next_release(motion, t))
+      out = self%members%gave_up
       call choose_method(choice, self%options, motion, y(:motion%n_controlled), t, t_until, &
-                         nint(self%n_outputs*((t_until - t)/self%t_end)), self%members%gave_up, self%monitor)
+                         nint(self%n_outputs*((t_until - t)/self%t_end)), out, self%monitor)
       self%n_choices = self%n_choices + 1
       self%tried = self%tried + choice%effort + effort_of_rates
       member = findloc(self%members%gave_up, .false., dim=1)

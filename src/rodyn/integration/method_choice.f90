@@ -75,8 +75,7 @@ contains
             expected = expected_efforts(scene, options, rates, ratio, span, available)
          end if
          best = minloc(expected + outputs(:n_even), dim=1)
-         if (any(available) .and. (expected(best) + outputs(best) < short_run .or. .not. rates%slow > 0.0_wp .or. &
-             ratio*(expected(best) + outputs(best)) < stiff_from(options%rtol, rates)*expected(best))) then
+         if (needs_no_trial(any(available), expected(best), outputs(best), ratio, options%rtol, rates)) then
             expected = expected + outputs(:n_even)
             if (expected(1)/merge(1.0_wp, even_lead, vibrating(rates, span) < 1.0_wp) <= expected(2)) return ! that may be huge
             choice%method = 'gauss'
@@ -127,6 +126,21 @@ contains
          text = text//'in a trial '//short(self%advantage)//' times as fast as explicit'
       end if
    end function reason
+
+   !> Is the run short, or are steps that follow all vibrations the best for certain?
+   pure logical function needs_no_trial(available, expected, output, ratio, rtol, rates)
+      logical, intent(in) :: available    !! a method that follows vibrations
+      real(wp), intent(in) :: expected    !! effort of the best of them, maybe huge
+      real(wp), intent(in) :: output      !! and that of its outputs
+      real(wp), intent(in) :: ratio       !! of the fastest rate to the chain's
+      real(wp), intent(in) :: rtol
+      type(fast_rates), intent(in) :: rates
+      needs_no_trial = .false.
+      if (.not. available) return
+      needs_no_trial = expected + output < short_run .or. .not. rates%slow > 0.0_wp
+      if (needs_no_trial) return
+      needs_no_trial = ratio*(1.0_wp + output/expected) < stiff_from(rtol, rates)
+   end function needs_no_trial
 
    !> Ratio of the fastest rate to the highest frequency of the chain from where implicit steps may pay. They need not follow
    !> vibrations below the tolerance, but the motion of the chain, with steps that shrink as the tolerance does.
