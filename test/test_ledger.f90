@@ -137,6 +137,7 @@ contains
          config%spacecraft%mass = 20.0_wp
          config%spacecraft%inertia = 5.0_wp
          config%loads = [load_config(target='spacecraft', component='X', law='constant', value=-force)]
+         config%t_end = t_end
          work = (force*t_end)**2/(2.0_wp*24.0_wp)
          if (which == 2) then
             config%loads(1)%law = 'sine_squared'
