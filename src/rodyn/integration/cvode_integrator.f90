@@ -2,7 +2,8 @@
 !> system of equations solves itself).
 !>
 !> Steps are taken one at a time towards the stop time; outputs are interpolated by CVODE's own polynomial, so
-!> neither their number nor their times change a step. Events are found by CVODE's rootfinding on the same polynomial.
+!> neither their number nor their times change a step. Events are sought on the same polynomial (`rodyn_event_search`);
+!> CVODE's own rootfinding compares the ends of steps alone.
 !>
 !> Tolerances are those of a step, and errors of these methods have the same sign from one period of a vibration to the next: they
 !> add up, to hundreds and thousands of tolerances where one-step methods leave tens. So CVODE is given smaller ones (`stricter`).
@@ -12,17 +13,17 @@ module rodyn_cvode_integrator
    use rodyn_errors, only: error_type, raise
    use rodyn_ode, only: ode_system
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, time_text
+   use rodyn_event_search, only: find_event
    use rodyn_nvector, only: new_nvector, free_nvector, vector_content, content_of
    use rodyn_newton_solver, only: new_newton_matrix, new_newton_solver, linear_system_shim
-   use rodyn_sundials_base, only: callback_data, rhs_shim, root_shim, weights_shim, quiet_handler, all_finite, raise_return_code
+   use rodyn_sundials_base, only: callback_data, rhs_shim, weights_shim, quiet_handler, all_finite, raise_return_code
    use fsundials_context_mod, only: FSUNContext_Create, FSUNContext_Free
    use fsundials_nvector_mod, only: N_Vector
    use fsundials_matrix_mod, only: SUNMatrix, FSUNMatDestroy
    use fsundials_linearsolver_mod, only: SUNLinearSolver, FSUNLinSolFree
    use fsundials_nonlinearsolver_mod, only: SUNNonlinearSolver, FSUNNonlinSolFree
    use fsunnonlinsol_fixedpoint_mod, only: FSUNNonlinSol_FixedPoint
-   use fcvode_mod, only: CV_ADAMS, CV_BDF, CV_SUCCESS, CV_TSTOP_RETURN, CV_ROOT_RETURN, CV_ONE_STEP, FCVodeCreate, FCVodeInit, &
-      FCVodeReInit, FCVodeRootInit, FCVodeSetRootDirection, FCVodeSetNoInactiveRootWarn, FCVodeGetRootInfo, &
+   use fcvode_mod, only: CV_ADAMS, CV_BDF, CV_SUCCESS, CV_TSTOP_RETURN, CV_ONE_STEP, FCVodeCreate, FCVodeInit, FCVodeReInit, &
       FCVodeFree, FCVode, FCVodeGetDky, FCVodeSetUserData, FCVodeWFtolerances, FCVodeSetErrHandlerFn, FCVodeSetMaxOrd, &
       FCVodeSetMaxStep, FCVodeSetStopTime, FCVodeSetStabLimDet, FCVodeSetNonlinearSolver, FCVodeSetLinearSolver, &
       FCVodeSetLinSysFn, FCVodeGetNumErrTestFails, FCVodeGetNumNonlinSolvConvFails, FCVodeGetLastOrder, FCVodeGetLastStep, &
@@ -46,6 +47,8 @@ module rodyn_cvode_integrator
       type(SUNLinearSolver), pointer :: linear => null()
       type(SUNNonlinearSolver), pointer :: nonlinear => null()
       type(callback_data), pointer :: data => null()
+      real(wp), allocatable, dimension(:) :: y_before, y_step, f_before, f_step, y_event !! for events: states and rates at both
+                                                                                         !! ends of the step; workspace
       type(solver_statistics) :: before_restart !! counts up to the last restart, which resets CVODE's
       real(wp) :: t_before = 0.0_wp                       !! start of the last internal step [s]
       real(wp), allocatable :: sums_before(:)             !! quadratures there
@@ -54,6 +57,7 @@ module rodyn_cvode_integrator
    contains
       procedure :: start
       procedure :: advance
+      procedure :: state_within
       procedure :: statistics
       procedure :: finalize
       final :: finalize_handles
@@ -170,28 +174,15 @@ contains
          call check(error, FCVodeSetMaxStep(self%memory, self%options%max_step), 'CVodeSetMaxStep')
          if (allocated(error)) return
       end if
-      if (self%system%n_events > 0) call watch_events(self, error)
-      if (allocated(error)) return
+      associate (n => merge(self%system%n_controlled, 0, self%system%n_events > 0))
+         allocate (self%y_before(n), self%y_step(n), self%f_before(n), self%f_step(n), self%y_event(n))
+      end associate
       if (self%multistep == CV_ADAMS) then
          call attach_fixed_point(self, error)
       else
          call attach_newton(self, error)
       end if
    end subroutine initialize
-
-   !> Let CVODE find where an event function becomes negative.
-   subroutine watch_events(self, error)
-      class(cvode_integrator), intent(inout) :: self
-      type(error_type), allocatable, intent(out) :: error
-      integer(c_int) :: direction(self%system%n_events)
-
-      direction = -1_c_int
-      call check(error, FCVodeRootInit(self%memory, int(self%system%n_events, c_int), c_funloc(root_shim)), 'CVodeRootInit')
-      if (allocated(error)) return
-      call check(error, FCVodeSetRootDirection(self%memory, direction), 'CVodeSetRootDirection')
-      if (allocated(error)) return
-      call check(error, FCVodeSetNoInactiveRootWarn(self%memory), 'CVodeSetNoInactiveRootWarn')
-   end subroutine watch_events
 
    !> Adams: functional iteration y <- g(y), no acceleration (m = 0): the iteration converges in one or two passes.
    subroutine attach_fixed_point(self, error)
@@ -269,7 +260,7 @@ contains
          self%stop_in_force = self%t_stop
       end if
       flag = FCVode(self%memory, self%t_stop, self%state, t_reached, CV_ONE_STEP)
-      if (flag /= CV_SUCCESS .and. flag /= CV_TSTOP_RETURN .and. flag /= CV_ROOT_RETURN) then
+      if (flag /= CV_SUCCESS .and. flag /= CV_TSTOP_RETURN) then
          self%n_steps = self%n_steps - 1
          call check(error, flag, 'CVode', self%t_good)
          call name_cause(self, error)
@@ -281,18 +272,18 @@ contains
          call raise(error, 'CVode at t = '//time_text(self%t_good)//' s: the state is not finite after the next step')
          return
       end if
-      if (flag == CV_ROOT_RETURN) then
-         call take_event(self, error)
-         if (allocated(error)) return
-      else if (.not. t_reached(1) > self%t_good) then
+      if (.not. t_reached(1) > self%t_good) then
          self%n_steps = self%n_steps - 1
          call raise(error, 'CVode at t = '//time_text(self%t_good)//' s: the step has become too small to advance')
          call name_cause(self, error)
          return
       end if
       self%t_before = self%t_good
+      if (self%system%n_events > 0) self%y_before(:) = self%y_good(:self%system%n_controlled)
       self%t_good = t_reached(1)
       self%y_good(:self%system%n_controlled) = content%values
+      if (self%system%n_events > 0) call look_for_event(self, error)
+      if (allocated(error)) return
       if (size(self%rate) > 0) call add_quadratures(self, error)
    end subroutine one_step
 
@@ -414,17 +405,47 @@ contains
       if (.not. ok) call raise(error, 'quadratures at t = '//time_text(t)//' s: the right-hand side could not be evaluated')
    end subroutine rates_of_quadratures
 
-   !> Which functions made CVODE stop.
-   subroutine take_event(self, error)
+   !> Did an event function become negative in the last step? Then the step ends there.
+   subroutine look_for_event(self, error)
       class(cvode_integrator), intent(inout) :: self
       type(error_type), allocatable, intent(inout) :: error
-      integer(c_int) :: found(self%system%n_events)
+      real(wp) :: t
 
-      call check(error, FCVodeGetRootInfo(self%memory, found), 'CVodeGetRootInfo', self%t_good)
+      call on_polynomial(self, self%t_before, 1, self%f_before, error)
+      if (.not. allocated(error)) call on_polynomial(self, self%t_good, 1, self%f_step, error)
       if (allocated(error)) return
-      self%crossed = found /= 0_c_int
-      self%pending = .true.
-   end subroutine take_event
+      self%y_step(:) = self%y_good(:self%system%n_controlled)
+      call find_event(self, self%t_before, self%y_before, self%f_before, self%t_good, self%y_step, self%f_step, self%pending, t, &
+                      self%y_event)
+      if (.not. self%pending) return
+      self%t_good = t
+      self%y_good(:self%system%n_controlled) = self%y_event
+   end subroutine look_for_event
+
+   !> For `rodyn_event_search`; without quadratures.
+   subroutine state_within(self, t, y, ok)
+      class(cvode_integrator), intent(inout) :: self
+      real(wp), intent(in) :: t
+      real(wp), contiguous, intent(out) :: y(:)
+      logical, intent(out) :: ok
+      type(error_type), allocatable :: error
+      call on_polynomial(self, t, 0, y, error)
+      ok = .not. allocated(error)
+   end subroutine state_within
+
+   !> CVODE's polynomial of the last step, or a derivative of it.
+   subroutine on_polynomial(self, t, derivative, y, error)
+      class(cvode_integrator), intent(inout) :: self
+      real(wp), intent(in) :: t !! [s]
+      integer, intent(in) :: derivative
+      real(wp), intent(out) :: y(:) !! (n_controlled)
+      type(error_type), allocatable, intent(inout) :: error
+      type(vector_content), pointer :: content
+
+      content => content_of(self%state)
+      call check(error, FCVodeGetDky(self%memory, t, int(derivative, c_int), self%state), 'CVodeGetDky', t)
+      if (.not. allocated(error)) y = content%values
+   end subroutine on_polynomial
 
    !> Add what the right-hand side had to say.
    subroutine name_cause(self, error)

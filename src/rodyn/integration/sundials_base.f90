@@ -10,7 +10,7 @@ module rodyn_sundials_base
    use fsundials_nvector_mod, only: N_Vector
    implicit none (type, external)
    private
-   public :: callback_data, rhs_shim, root_shim, weights_shim, quiet_handler, all_finite, raise_return_code, sundials_version
+   public :: callback_data, rhs_shim, weights_shim, quiet_handler, all_finite, raise_return_code, sundials_version
 
    !> What the callbacks find behind `user_data`.
    type :: callback_data
@@ -83,23 +83,6 @@ contains
       data%t_refused = t
       flag = 1_c_int
    end function rhs_shim
-
-   !> CVRootFn: the event functions of the system.
-   function root_shim(t, y, values, user_data) result(flag) bind(c)
-      real(c_double), intent(in), value :: t
-      type(N_Vector), intent(in) :: y
-      real(c_double), intent(out) :: values(*)
-      type(c_ptr), intent(in), value :: user_data
-      integer(c_int) :: flag
-
-      type(callback_data), pointer :: data
-      type(vector_content), pointer :: states
-
-      call c_f_pointer(user_data, data)
-      states => content_of(y)
-      call data%system%event_functions(t, states%values, values(:data%system%n_events))
-      flag = 0_c_int
-   end function root_shim
 
    !> CVEwtFn and ARKEwtFn: w = 1/(rtol |y| + atol) for the controlled states, next to nothing for the quadratures.
    function weights_shim(y, w, user_data) result(flag) bind(c)
