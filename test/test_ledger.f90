@@ -39,11 +39,12 @@ contains
    end subroutine one_rod
 
    !> Run a case to t_end by every method at rtol = 1e-4 ... 1e-12 and compare the sums at its end.
-   subroutine compare(config, t_end, work, dissipated, scale, error)
+   subroutine compare(config, t_end, work, dissipated, scale, error, order_of_erk)
       type(case_config), intent(inout) :: config
       real(wp), intent(in) :: t_end, work, dissipated !! [s], [J]
       real(wp), intent(in) :: scale                   !! energy of the run [J]
       type(error_type), allocatable, intent(out) :: error
+      integer, intent(in), optional :: order_of_erk
       type(trajectory) :: motion
       character(len=100) :: text
       real(wp) :: off
@@ -52,6 +53,8 @@ contains
       do i = 1, size(methods)
          do digits = 4, 12, 2
             config%solver%method = methods(i)
+            config%solver%order = 0
+            if (present(order_of_erk) .and. methods(i) == 'erk') config%solver%order = order_of_erk
             config%solver%rtol = 10.0_wp**(-digits)
             config%solver%atol = 1.0e-2_wp*config%solver%rtol
             call integrate(config, [0.0_wp, 0.37_wp*t_end, t_end], motion, error)
@@ -123,7 +126,8 @@ contains
       call compare(config, 20.0_wp, 0.0_wp, 0.5_wp*inertia*rate**2, 0.5_wp*inertia*rate**2, error)
    end subroutine test_decay
 
-   !> A force along a straight chain turns nothing: W = I^2/(2 m), I its impulse.
+   !> A force along a straight chain turns nothing: W = I^2/(2 m), I its impulse. Then the motion itself is a quadrature, to
+   !> which the pair of order 8 of `erk` is blind.
    subroutine test_free_body(error)
       type(error_type), allocatable, intent(out) :: error
       type(case_config) :: config
@@ -144,7 +148,7 @@ contains
             config%loads(1)%rate = rate
             work = (force*(0.5_wp*t_end - sin(2.0_wp*rate*t_end)/(4.0_wp*rate)))**2/(2.0_wp*24.0_wp)
          end if
-         call compare(config, t_end, work, 0.0_wp, work, error)
+         call compare(config, t_end, work, 0.0_wp, work, error, order_of_erk=6)
          if (allocated(error)) return
       end do
    end subroutine test_free_body
