@@ -16,7 +16,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[1]
 
 def main() -> None:
     """Look at every build directory."""
-    module_of: dict[str, str] = {}
+    objects_of: dict[str, list[str]] = {}  # several where a benchmark has its own version of a module
     used_by: dict[str, set[str]] = {}
     for folder in ("src", "app", "test", "bench"):
         for path in sorted((ROOT / folder).rglob("*.[fF]90")):
@@ -24,11 +24,11 @@ def main() -> None:
             name = str(path.relative_to(ROOT)).replace("/", "_") + ".o"
             used_by[name] = set(re.findall(r"^\s*use (rodyn\w*)", text, re.MULTILINE))
             for module in re.findall(r"^\s*(?:sub)?module (?!procedure)(?:\(\w+\) )?(\w+)", text, re.MULTILINE):
-                module_of[module] = name
+                objects_of.setdefault(module, []).append(name)
     for folder in sorted((ROOT / "build").glob("*/rodyn")):
         made = {path.name: path.stat().st_mtime_ns for path in folder.glob("*.o")}
         for name, modules in used_by.items():
-            needed = max((made.get(module_of.get(module, ""), 0) for module in modules), default=0)
+            needed = max((made.get(other, 0) for module in modules for other in objects_of.get(module, [])), default=0)
             if name in made and needed > made[name]:
                 (folder / f"{name}.digest").unlink(missing_ok=True)
         for library in folder.glob("lib*.a"):
