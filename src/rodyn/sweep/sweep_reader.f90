@@ -630,14 +630,17 @@ contains
       dimension_size = axis_size(sweep%axes(findloc(sweep%axes%dimension, d, 1)))
    end function dimension_size
 
-   !> Does a value of the row break the rule of its own key, which has been told?
+   !> Does a value of the row break the rule of its own key, or is the key itself at fault, which has been told?
    pure logical function is_bad(sweep, d, row)
       type(sweep_config), intent(in) :: sweep
       integer, intent(in) :: d, row
       integer :: a
       is_bad = .false.
       do a = 1, size(sweep%axes)
-         if (sweep%axes(a)%dimension == d) is_bad = is_bad .or. sweep%axes(a)%bad(row)
+         if (sweep%axes(a)%dimension /= d) cycle
+         is_bad = .not. allocated(sweep%axes(a)%bad)
+         if (.not. is_bad) is_bad = sweep%axes(a)%bad(row)
+         if (is_bad) return
       end do
    end function is_bad
 
