@@ -309,6 +309,7 @@ contains
          text = '&solver fixed_step = 1e-12, method = ''erk'' /'
          config%solver%method = 'erk'
          config%solver%fixed_step = 1.0e-12_wp
+      case default ! there is no other
       end select
 
    contains
@@ -441,6 +442,7 @@ contains
             config%spacecraft%motion = 'FIXED'
          case (10)
             config%spacecraft%inertia = -2.0_wp
+         case default ! there is no other
          end select
          call new_scene(scene, config, refusal)
          call check(error, allocated(refusal), 'accepted instead of '//message)

@@ -11,7 +11,7 @@ module test_ledger
    public :: collect_ledger
 
    character(len=6), parameter :: methods(5) = [character(len=6) :: 'adams', 'bdf', 'erk', 'dop853', 'gauss']
-   real(wp), parameter :: bound(5) = [50.0_wp, 500.0_wp, 50.0_wp, 50.0_wp, 50.0_wp] !! of errors, in rtol times the energy of the run
+   real(wp), parameter :: bound(5) = [50.0_wp, 500.0_wp, 50.0_wp, 50.0_wp, 50.0_wp] !! of errors, in rtol times the run's energy
 
 contains
 

@@ -9,7 +9,7 @@ module rodyn_build_info
    public :: program_version, git_commit, set_git_commit, compiler, compiler_options
 
    character(len=*), parameter :: program_version = '0.1.0'
-   character(len=64), save :: commit = 'unknown'
+   character(len=64) :: commit = 'unknown'
 
 contains
 

@@ -139,6 +139,7 @@ contains
             given = program_gives(c%kink_programs(instance), key)
          case ('hinge')
             given = hinge_gives(c%hinges(instance), key)
+         case default ! asked for in files alone
          end select
       end associate
    end function is_given

@@ -433,7 +433,7 @@ contains
    !> Eigenvalues, right vectors, and what rounding may have done to the eigenvalues. A zero of two, or of three, that has fewer
    !> vectors comes out as values of the size of the square, or cube, root of epsilon around it: their condition tells. It is
    !> asked for, and vectors with it, only where a rate is so small that it might be such a zero, or where vectors are wanted.
-   !> The matrix is off by rounding of its norm, and, where it has stiffnesses over small scales, by rounding of the largest of them.
+   !> The matrix is off by rounding of its norm, and, where it has stiffnesses over small scales, by rounding of the largest.
    subroutine eigen(a, scale, stiffness, with_vectors, re, im, vectors, doubt, error)
       real(wp), intent(inout) :: a(:, :)
       real(wp), intent(in) :: scale(:)  !! of the leading coordinates [1/s]

@@ -6,8 +6,8 @@
 !>
 !> The tables are SUNDIALS' own: Heun-Euler 2(1), Bogacki-Shampine 3(2), Zonneveld 4(3), Cash-Karp 5(4), Verner 6(5),
 !> Fehlberg 8(7); order 7 is Fehlberg's pair with its two solutions exchanged. Fehlberg's error estimate is blind to
-!> pure quadratures, y' = f(t); those behind the states have one of their own. A right-hand side that cannot be evaluated ends an ERKStep run at once, without
-!> trying a shorter step.
+!> pure quadratures, y' = f(t); those behind the states have one of their own. A right-hand side that cannot be evaluated
+!> ends an ERKStep run at once, without trying a shorter step.
 module rodyn_erk_integrator
    use, intrinsic :: iso_c_binding, only: c_ptr, c_int, c_long, c_double, c_null_ptr, c_associated, c_loc, c_funloc, c_f_pointer
    use rodyn_kinds, only: wp, i8

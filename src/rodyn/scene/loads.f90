@@ -189,6 +189,7 @@ contains
             piece%change = load%values(i + 1) - load%values(i)
          end if
          if (.not. abs(piece%change) > 0.0_wp) piece%law = law_constant
+      case default ! the others stay what they are
       end select
    end function piece_of
 
