@@ -29,6 +29,7 @@ module rodyn_sweep_reader
 
    character(len=*), parameter :: nl = new_line('a')
    integer, parameter :: most_tried = 10000 !! rows of a dimension that are built
+   integer, parameter :: most_dimensions = 60 !! of a sweep whose rows are built: of more it has too many cases in any event
    integer, parameter :: most_told = 10     !! values of an axis that are named
    type(schema_row), parameter :: ratio_row = schema_row('', 'mass_ratio', type_real, rule=positive)
    character(len=*), parameter :: heading = &
@@ -91,7 +92,8 @@ contains
          if (len(base_failure) > 0) call blame(checked, 'sweep', 1, 'base', base_failure)
       end if
       call load_sweep(checked, sweep, has_base, has_base .and. .not. allocated(base_error))
-      if (try_values .and. has_base .and. .not. allocated(base_error)) call try_axes(checked, sweep)
+      if (try_values .and. has_base .and. .not. allocated(base_error) .and. sweep%n_dimensions <= most_dimensions) &
+         call try_axes(checked, sweep)
       call checked%faults%to_error(name, error)
       if (.not. allocated(base_error)) return
       if (allocated(error)) base_error%message = error%message//nl//base_error%message
