@@ -109,7 +109,7 @@ def draw(sweep: Sweep, names: Sequence[str], axis: str, known: Sequence[float | 
     rows = -(-len(names) // columns)
     figure, grid = style.new_figure(rows, columns, height=0.9 + 2.9 * rows)
     than = "finest case of each line" if known[0] is None else "reference"
-    figure.suptitle(f"Convergence: {heading(sweep, names, time, where, 34)}; error against the {than}")
+    figure.suptitle(f"{heading(sweep, names, time, where)}\nerror against the {than}")
     figure.fits = {}
     for axes, name, value in zip(grid.flat, names, known, strict=False):
         figure.fits.update(draw_panel(axes, sweep, name, axis, value, where, time))
@@ -145,7 +145,8 @@ def draw_panel(axes: Axes, sweep: Sweep, name: str, axis: str, exact: float | No
     axes.set(xlabel=sweep.axis_label(axis), ylabel=f"|error of {quantity.symbol}|" + (f" [{quantity.unit}]" if quantity.unit else ""))
     axes.set_title(quantity.meaning, loc="left")
     if not any(np.isfinite(line.get_ydata()).any() for line in axes.lines if line.get_marker() != "x"):
-        style.note(axes, "no case differs from the reference")
+        chosen = sweep.chosen(where)
+        style.note(axes, "every case failed" if sweep.failed[chosen].all() else "no case differs from the reference")
         axes.set_yticks([])
         axes.set_yticks([], minor=True)
     numbers = np.unique(sweep.axis(axis)[sweep.chosen(where)])

@@ -31,7 +31,7 @@ body { font: 15px/1.5 system-ui, sans-serif; color: #1b1b1b; max-width: 60rem; m
 h1 { font-size: 1.5rem; margin-bottom: .2rem; } h2 { font-size: 1.15rem; margin-top: 2.2rem; border-bottom: 1px solid #ccc; }
 table { border-collapse: collapse; margin: .6rem 0; font-size: 13px; } caption { text-align: left; font-weight: 600; white-space: nowrap; }
 th, td { padding: .2rem .7rem .2rem 0; text-align: left; vertical-align: top; border-bottom: 1px solid #e4e4e4; }
-th.n, td.n { text-align: right; font-variant-numeric: tabular-nums; } td { overflow-wrap: anywhere; }
+th.n, td.n { text-align: right; font-variant-numeric: tabular-nums; } td { overflow-wrap: anywhere; } td:first-child { overflow-wrap: normal; }
 figure { margin: 1.2rem 0; } figure img { max-width: 100%; width: 50rem; height: auto; }
 figure img[src^="data:image/gif"] { width: auto; }
 figcaption { font-size: 13px; color: #444; }

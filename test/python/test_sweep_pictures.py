@@ -214,6 +214,22 @@ def test_equal_cases_are_said_to_be_equal(tmp_path):
     figure = convergence.plot(path, tmp_path / "x.png", ["phi(1)"])
     assert figure.fits == {("phi(1)", ""): None}
     assert [t.get_text() for t in figure.axes[0].texts] == ["no case differs from the reference"]
+    result_files.write_sweep(path, {"case.n_outputs": [10, 20, 40]}, np.ones((3, 1, 1)), failed=[0, 1, 2])
+    figure = convergence.plot(path, tmp_path / "x.png", ["phi(1)"])
+    assert [t.get_text() for t in figure.axes[0].texts] == ["every case failed"]
+
+
+def test_titles_of_pictures_are_whole_and_fit(tmp_path):
+    """The title of the sweep is not cut to make room for what the picture shows."""
+    path = result_files.write_sweep(tmp_path / "s.h5", {"case.n_outputs": [10, 20, 40]}, np.array([1.1, 1.01, 1.0]).reshape(3, 1, 1))
+    with h5py.File(path, "a") as file:
+        file.attrs["title"] = np.bytes_("Table 1: four rods, one second of thrust, of which nothing")
+    figure = convergence.plot(path, tmp_path / "x.png", ["phi(1)"])
+    assert figure.get_suptitle().startswith("Table 1: four rods, one second of thrust, of which nothing")
+    assert figure.get_suptitle().endswith("error against the finest case of each line")
+    box = figure._suptitle.get_window_extent()
+    assert figure.bbox.x0 <= box.x0 and box.x1 <= figure.bbox.x1
+    assert all(box.y0 >= axes.title.get_window_extent().y1 for axes in figure.axes)
 
 
 def test_a_directory_stands_for_its_sweep(tmp_path):
