@@ -382,6 +382,26 @@ def test_a_script_that_was_started_several_times_knows_what_it_does(tmp_path, la
     assert files(tmp_path) == ["0.h5", "1.h5", "case.nml"]
 
 
+@pytest.mark.parametrize("launcher", LAUNCHERS, ids=lambda launcher: next(iter(launcher)))
+def test_what_only_wraps_a_command_is_seen_through(tmp_path, launcher):
+    """As `mpirun -n 2 timeout 60 rodyn run case.nml`; but not where the wrapper goes to a directory of its own first."""
+    write_case(tmp_path, SCENES["one rod"])
+    for rank in (0, 1):
+        env = as_rank(launcher, rank) | {"PWD": str(tmp_path)}
+        for wrapper in (["timeout", "60"], ["nice"], ["sh", "-c", '"$@"; exit $?', "sh"], ["timeout", "60", "timeout", "60"]):
+            done = subprocess.run([*wrapper, RODYN, "run", "case.nml"], cwd=tmp_path, env=env, capture_output=True, text=True)
+            assert done.returncode == 2 and (rank > 0) == (done.stderr == ""), (wrapper, done.stderr)
+        (tmp_path / str(rank)).mkdir()
+        write_case(tmp_path / str(rank), SCENES["one rod"])
+        done = subprocess.run(["sh", "-c", f'cd {rank}; "$@"; exit $?', "sh", RODYN, "run", "case.nml"], cwd=tmp_path, env=env,
+                              capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        done = subprocess.run(["bash", "-c", f"{RODYN} run case.nml --output {rank}.h5"], cwd=tmp_path, env=env,
+                              capture_output=True, text=True)  # bash becomes the program
+        assert done.returncode == 0, done.stderr
+    assert files(tmp_path) == ["0", "0.h5", "1", "1.h5", "case.nml"]
+
+
 def test_a_job_of_several_tasks_is_no_reason_to_refuse(tmp_path):
     """A job script or shell of Slurm is one process, whatever the tasks of the job."""
     write_case(tmp_path, SCENES["one rod"])
@@ -398,6 +418,18 @@ def test_mpirun_does_not_run_a_case_twice(tmp_path):
                                 capture_output=True, text=True)
         assert result.returncode == code and (result.stdout + result.stderr).count(words) == 1
     assert files(tmp_path) == ["case.nml"]
+    mpirun = ["mpirun", "--oversubscribe", "-n", "2"]
+    done = subprocess.run([*mpirun, "timeout", "60", RODYN, "run", "case.nml"], cwd=tmp_path, env=root, capture_output=True, text=True)
+    assert done.returncode == 2 and done.stderr.count("2 processes were started together") == 1
+    assert files(tmp_path) == ["case.nml"]
+    done = subprocess.run([*mpirun, "sh", "-c", f"{RODYN} run case.nml --output $OMPI_COMM_WORLD_RANK.h5"], cwd=tmp_path, env=root,
+                          capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    each = [["-n", "1", RODYN, "run", "case.nml", "--output", f"{name}.h5"] for name in "ab"]
+    done = subprocess.run(["mpirun", "--oversubscribe", *each[0], ":", *each[1]], cwd=tmp_path, env=root, capture_output=True,
+                          text=True)
+    assert done.returncode == 0, done.stderr
+    assert files(tmp_path) == ["0.h5", "1.h5", "a.h5", "b.h5", "case.nml"]
 
 
 # What is allowed but hardly meant
@@ -476,6 +508,32 @@ def test_an_existing_result_is_replaced_by_force_only(tmp_path):
     assert (tmp_path / "case.h5").read_text() == "precious"
     assert rodyn("run", "case.nml", "--force", cwd=tmp_path).returncode == 0
     assert h5py.is_hdf5(tmp_path / "case.h5")
+    assert files(tmp_path) == ["case.h5", "case.nml"]
+
+
+def test_a_failed_run_replaces_none_but_a_failed_one(tmp_path):
+    good = SCENES["one rod"]
+    bad = good + "&solver method = 'dop853', max_steps = 3 /\n"
+    write_case(tmp_path, good)
+    assert rodyn("run", "case.nml", cwd=tmp_path).returncode == 0
+    before = (tmp_path / "case.h5").read_bytes()
+    for steps in ("3", "4"):
+        write_case(tmp_path, bad.replace("max_steps = 3", f"max_steps = {steps}"))
+        result = rodyn("run", "case.nml", "--force", cwd=tmp_path)
+        assert result.returncode == 1 and "rows until then are in case.h5.failed" in result.stderr, result.stderr
+        assert result.stdout.splitlines()[-1] == "file    case.h5.failed"
+        assert files(tmp_path) == ["case.h5", "case.h5.failed", "case.nml"]
+        assert (tmp_path / "case.h5").read_bytes() == before
+        with h5py.File(tmp_path / "case.h5.failed") as run:
+            assert run.attrs["status"] == b"failed" and f"max_steps = {steps}".encode() in run.attrs["input"]
+    (tmp_path / "case.h5.failed").rename(tmp_path / "case.h5")
+    write_case(tmp_path, bad)
+    assert rodyn("run", "case.nml", "--force", cwd=tmp_path).returncode == 1
+    assert files(tmp_path) == ["case.h5", "case.nml"]
+    write_case(tmp_path, good)
+    assert rodyn("run", "case.nml", "--force", cwd=tmp_path).returncode == 0
+    with h5py.File(tmp_path / "case.h5") as run:
+        assert run.attrs["status"] == b"done"
     assert files(tmp_path) == ["case.h5", "case.nml"]
 
 

@@ -502,3 +502,104 @@ def test_file_systems_without_locks(place, no_locks, number, name):
     refused(rodyn("sweep", "s.nml", "--shard", "1/2", cwd=place, env=off), "shards need a file system with locks")
     result = rodyn("sweep", "s.nml", cwd=place, env=off)
     assert result.returncode == 0, result.stderr
+
+
+# Where a result cannot go
+
+
+#: A file system that cannot set bytes aside and has a quota that a write meets, as NFS may.
+QUOTA = """
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <errno.h>
+#include <stdlib.h>
+#include <unistd.h>
+int fallocate(int descriptor, int mode, off_t offset, off_t bytes) { errno = EOPNOTSUPP; return -1; }
+ssize_t pwrite(int descriptor, const void *data, size_t bytes, off_t offset) {
+   if (offset + (off_t)bytes > atol(getenv("QUOTA"))) { errno = EDQUOT; return -1; }
+   return ((ssize_t (*)(int, const void *, size_t, off_t))dlsym(RTLD_NEXT, "pwrite"))(descriptor, data, bytes, offset);
+}
+ssize_t pwrite64(int descriptor, const void *data, size_t bytes, off_t offset) { return pwrite(descriptor, data, bytes, offset); }
+"""
+
+
+def test_a_quota_that_only_a_write_meets_leaves_the_rows_before_it(tmp_path):
+    (tmp_path / "quota.c").write_text(QUOTA)
+    subprocess.run(["gcc", "-shared", "-fPIC", "-o", "quota.so", "quota.c", "-ldl"], cwd=tmp_path, check=True)
+    (tmp_path / "case.nml").write_text(faults.CASE.replace("t_end = 3, n_outputs = 6000", "t_end = 0.3, n_outputs = 6000"))
+    assert rodyn("run", "case.nml", "--output", "whole.h5", cwd=tmp_path).returncode == 0
+    rows = []
+    for quota in (20_000, 400_000, 800_000, 4_000_000):
+        env = os.environ | {"LD_PRELOAD": str(tmp_path / "quota.so"), "QUOTA": str(quota)}
+        result = rodyn("run", "case.nml", "--output", f"{quota}.h5", cwd=tmp_path, env=env)
+        if quota == 4_000_000:
+            assert result.returncode == 0, result.stderr
+            continue
+        assert result.returncode == 1 and "Disk quota exceeded" in result.stderr, result.stderr
+        assert [path.name for path in tmp_path.glob(f"{quota}*")] == ([f"{quota}.h5"] if quota > 20_000 else [])
+        if quota > 20_000:
+            assert f"rows until then are in {quota}.h5" in result.stderr
+            with h5py.File(tmp_path / f"{quota}.h5") as part, h5py.File(tmp_path / "whole.h5") as whole:
+                rows.append(part["time"].size)
+                assert part.attrs["status"] == b"failed" and np.array_equal(part["phi"], whole["phi"][:rows[-1]])
+    assert 0 < rows[0] < rows[1] < 6001
+    assert differences(tmp_path / "whole.h5", tmp_path / "4000000.h5") <= OF_THE_HOUR
+
+
+def begun(directory: pathlib.Path, process: subprocess.Popen) -> None:
+    """Until a run has begun its file."""
+    while not list(directory.glob("*.partial-*")) and process.poll() is None:
+        time.sleep(0.01)
+
+
+def test_a_directory_that_cannot_be_made_again_costs_no_result(tmp_path):
+    (tmp_path / "case.nml").write_text(faults.CASE.replace("t_end = 3", "t_end = 6"))
+    (tmp_path / "out").mkdir()
+    (tmp_path / "elsewhere").mkdir()
+    with subprocess.Popen([RODYN, "run", "case.nml", "--output", "out/x.h5", "--quiet"], cwd=tmp_path, stderr=subprocess.PIPE,
+                          text=True, env=os.environ | {"TMPDIR": str(tmp_path / "elsewhere")}) as process:
+        begun(tmp_path / "out", process)
+        shutil.rmtree(tmp_path / "out")
+        (tmp_path / "out").write_text("in the way")
+        errors = process.communicate(timeout=60)[1]
+    assert process.returncode == 1
+    [path] = (tmp_path / "elsewhere").iterdir()
+    assert errors.startswith("out/x.h5: its directory was removed and cannot be made again: Not a directory")
+    assert errors.endswith(f"the result is '{path}'\n")
+    with h5py.File(path) as run:
+        assert run.attrs["status"] == b"done" and run["time"][-1] == 6
+
+
+def test_a_directory_that_becomes_read_only_costs_no_result(for_anyone):
+    directory, user = for_anyone
+    executable = reachable(user)
+    (directory / "case.nml").write_text(faults.CASE.replace("t_end = 3", "t_end = 6"))
+    for stop in (False, True):
+        out = directory / f"out-{stop}"
+        out.mkdir()
+        out.chmod(0o777)
+        with subprocess.Popen([executable, "run", "case.nml", "--output", f"{out.name}/x.h5", "--quiet"], cwd=directory,
+                              stderr=subprocess.PIPE, text=True, **user) as process:
+            begun(out, process)
+            out.chmod(0o555)
+            if stop:
+                time.sleep(0.1)
+                process.terminate()
+            errors = process.communicate(timeout=60)[1]
+        [path] = out.iterdir()
+        assert process.returncode == 1 and f"the result is '{out.name}/{path.name}'" in errors, errors
+        with h5py.File(path) as run:
+            assert run.attrs["status"] == (b"stopped" if stop else b"done") and run["time"].size > 0
+    if user:
+        shutil.rmtree(pathlib.Path(executable).parent)
+
+
+def test_a_sweep_says_that_its_directory_was_removed(place):
+    (place / "base.nml").write_text(CASE.replace("t_end = 0.05", "t_end = 20"))
+    (place / "s.nml").write_text("&sweep base = 'base.nml' /\n&axis key = 'case.t_end', start = 20, stop = 21, count = 9 /\n")
+    with subprocess.Popen([RODYN, "sweep", "s.nml", "--quiet"], cwd=place, stderr=subprocess.PIPE, text=True) as process:
+        while not list(place.glob("s/shards/*")) and process.poll() is None:
+            time.sleep(0.01)
+        shutil.rmtree(place / "s")
+        errors = process.communicate(timeout=100)[1]
+    assert process.returncode == 1 and errors == "s: was removed, and all results with it\n", errors

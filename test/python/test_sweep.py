@@ -383,6 +383,46 @@ def test_a_case_that_fails_in_a_lane_disturbs_no_other(here):
     np.testing.assert_array_equal(data.n_rhs[others], good.n_rhs[others])
 
 
+def test_switches_an_ulp_apart_are_one_in_every_company(here):
+    """Axes make such numbers. Each case of a sweep has the bytes of a sweep of it alone, in lanes and by itself; all are near."""
+    pulse = "&load component = 'M', t_start = 0.01, t_end = {}, value = 1000 /\n&load component = 'M', t_start = 0.03, value = -900 /\n"
+    ends = [np.nextafter(0.03, 0), 0.03, np.nextafter(0.03, 1), 0.01 + 0.02, 0.1 * 0.3, 3 * 0.01]
+    (here / "base.nml").write_text(BASE.split("&load")[0] + pulse.format("0.03") + "&solver rtol = 1e-8, method = 'dop853' /\n")
+    axes = "&axis key = 'load(1).t_end', values = {} /\n&axis key = 'case.t_end', values = 0.05, 0.03, 0.030000000000000002 /\n"
+    for lanes in (".true.", ".false."):
+        head = f"&sweep base = 'base.nml', lanes = {lanes}, probe_times = 0.029 /\n"
+        sweep(here, head + axes.format(", ".join(repr(float(end)) for end in ends)), name=f"all{lanes[1]}")
+        data = opened(here, f"all{lanes[1]}")
+        assert set(data.status.values) == {"done"} and ("8 lanes" in data.attrs["lanes"]) == (lanes == ".true.")
+        final = data.final_phi.values.reshape(len(ends), 3, -1)
+        assert np.ptp(final[:, 0], axis=0).max() < 1e-12 and np.ptp(final[:, 1:], axis=(0, 1)).max() < 1e-12
+        for shard in range(1, 19):
+            sweep(here, (here / f"all{lanes[1]}.nml").read_text(), "--shard", f"{shard}/18", name=f"one{lanes[1]}")
+        assert content(here / f"all{lanes[1]}") == content(here / f"one{lanes[1]}")
+
+
+UNEQUAL = """&sweep base = 'base.nml', combine = 'zip', probe_times = 0.001, 0.05 /
+&axis key = 'case.t_end', values = 0.05, 0.001, 3, 0.002, 0.05, 0.7, 0.001, 0.05, 1, 0.05, 0.003, 0.05 /
+&axis key = 'load(1).value', values = 1000, 1e300, 1000, 1, 1e308, -1000, 3, 1e200, 1, 2, 1e305, 5 /
+"""
+
+
+def test_very_unequal_and_hopeless_cases_have_the_bytes_they_have_alone(here):
+    """Where `auto` takes dop853: a lane that gives up is computed again by itself, with the other methods, too."""
+    sweep(here, UNEQUAL, code=1)
+    data = opened(here)
+    assert "8 lanes" in data.attrs["lanes"]
+    hopeless = np.abs(np.array([1e3, 1e300, 1e3, 1, 1e308, -1e3, 3, 1e200, 1, 2, 1e305, 5])) > 1e100
+    assert np.array_equal(data.status.values == "failed", hopeless)
+    for shard in range(1, 13):
+        sweep(here, UNEQUAL, "--shard", f"{shard}/12", name="alone", code=int(hopeless[shard - 1]) if shard < 12 else 1)
+    assert content(here / "s") == content(here / "alone")
+    for case in (2, 6):
+        ends = ("t_end = 0.05", f"t_end = {float(data['param_case.t_end'][case])!r}")
+        one = single(here, ends, ("value = 1000 /", f"value = {float(data['param_load(1).value'][case])!r} /"))
+        np.testing.assert_allclose(data.final_phi[case], one.phi[-1], rtol=0, atol=1e-6)
+
+
 FREQUENCIES = """&sweep base = 'base.nml', frequencies = 9, {} probe_times = 0.02, 0.05 /
 &axis key = 'chain.hinge_stiffness(0)', values = 2000, 5000 /
 &axis key = 'model.inertia', text_values = 'distributed', 'lumped' /
@@ -564,6 +604,20 @@ def test_a_signal_stops_at_a_case_and_is_resumed(here, number):
     assert "of them on the disk" in sweep(here, None).stdout
     sweep(here, LONG, name="whole")
     assert content(here / "s") == content(here / "whole")
+
+
+def test_a_result_is_discarded_when_its_successor_is_there(here):
+    sweep(here, GRID)
+    before = (here / "s" / "sweep.h5").read_bytes()
+    for _ in range(2):
+        shutil.rmtree(here / "s" / "shards")  # or `start` would take them for new ones
+        process = start(here, "--force")
+        process.terminate()
+        process.communicate()
+        assert process.returncode == 75
+        assert not (here / "s" / "sweep.h5").exists() and (here / "s" / "sweep.h5.before").read_bytes() == before
+    sweep(here, None)
+    assert opened(here).sizes["case"] == 60 and not (here / "s" / "sweep.h5.before").exists()
 
 
 def test_two_processes_never_work_on_one_sweep(here):

@@ -45,6 +45,7 @@ module rodyn_result_file
       procedure :: leave
       procedure, private :: put_on_disk
       procedure, private :: bring_back
+      procedure, private :: copy_to
    end type result_file
 
 contains
@@ -192,13 +193,14 @@ contains
    !> Sync the closed file, rename it, sync the directory's names. If the final name was taken meanwhile, the
    !> result stays under its temporary name and the message says so.
    subroutine put_on_disk(self, error)
-      class(result_file), intent(in) :: self
+      class(result_file), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
       character(len=:), allocatable :: failure
       logical :: taken
 
       failure = ''
-      if (.not. path_exists(self%temporary_path)) failure = self%bring_back()
+      if (.not. path_exists(self%temporary_path)) call self%bring_back(failure, error)
+      if (allocated(error)) return
       if (len(failure) == 0) failure = sync_path(self%temporary_path)
       if (len(failure) > 0) then
          call raise(error, self%temporary_path//': the result could not be put onto the disk: '//failure)
@@ -222,22 +224,40 @@ contains
       end if
    end subroutine put_on_disk
 
-   !> Somebody has removed the file, perhaps with its directory: as long as it is open its content is there.
-   function bring_back(self) result(failure)
+   !> Somebody has removed the file, perhaps with its directory: as long as it is open its content is there. Where the directory
+   !> cannot be made again it goes among the temporary files of the system, and that is an error.
+   subroutine bring_back(self, failure, error)
+      class(result_file), intent(inout) :: self
+      character(len=:), allocatable, intent(out) :: failure !! empty: it is there again
+      type(error_type), allocatable, intent(out) :: error
+      character(len=:), allocatable :: elsewhere
+
+      failure = make_directory(parent_directory(self%temporary_path))
+      if (len(failure) == 0) failure = self%copy_to(self%temporary_path)
+      if (len(failure) == 0) return
+      elsewhere = free_temporary_name(temporary_directory()//'/'//self%path(index(self%path, '/', back=.true.) + 1:))
+      if (len(self%copy_to(elsewhere)) > 0) return
+      call raise(error, self%path//': its directory was removed and cannot be made again: '//failure// &
+                 "; the result is '"//elsewhere//"'")
+   end subroutine bring_back
+
+   !> Write the content of the file, which is open but has no name, into a new one.
+   function copy_to(self, path) result(failure)
       class(result_file), intent(in) :: self
+      character(len=*), intent(in) :: path
       character(len=:), allocatable :: failure
       integer(c_int) :: descriptor, status
 
-      failure = make_directory(parent_directory(self%temporary_path))
-      if (len(failure) > 0) return
-      descriptor = create_file(self%temporary_path)
+      failure = ''
+      descriptor = create_file(path)
       if (descriptor < 0) then
          failure = last_failure()
          return
       end if
       failure = self%room%copy(descriptor)
       status = posix_close(descriptor)
-   end function bring_back
+      if (len(failure) == 0) failure = sync_path(path)
+   end function copy_to
 
    !> A name beside the final one that no file has. Process numbers repeat in containers, so they alone will not do.
    function free_temporary_name(path) result(name)
@@ -254,6 +274,17 @@ contains
          name = path//trim(suffix)
       end do
    end function free_temporary_name
+
+   !> For what finds no other place.
+   function temporary_directory() result(path)
+      character(len=:), allocatable :: path
+      integer :: length
+
+      call get_environment_variable('TMPDIR', length=length)
+      allocate (character(len=length) :: path)
+      call get_environment_variable('TMPDIR', path)
+      if (length == 0) path = '/tmp'
+   end function temporary_directory
 
    !> A text that may not be there.
    pure function text_or_empty(text) result(value)

@@ -7,8 +7,9 @@
 !>
 !> Until `finish`, the file has a temporary name (`rodyn_result_file`) under which it may be read: rows are in it a block at
 !> a time, and where that takes long after a minute at the latest. Where they find no room, `append` fails, and `finish` ends
-!> the file as a failed one with the rows that did. After a failure within HDF5 the file is left as it is, and every later
-!> call tells of that failure again, so that the caller may end its work in the usual way.
+!> the file as a failed one with the rows that did. A failed file replaces no other than a failed one (`force`). After a failure
+!> within HDF5 the file is left as it is, and every later call tells of that failure again, so that the caller may end its work in
+!> the usual way.
 module rodyn_run_file
    use rodyn_build_info, only: git_commit
    use rodyn_errors, only: error_type, raise
@@ -392,6 +393,7 @@ contains
       if (allocated(self%no_room) .and. status == 'done') outcome = 'failed'
       if (allocated(self%no_room)) reason = self%no_room
       if (present(message)) reason = message
+      if (outcome == 'failed' .and. self%force) call step_aside(self%path)
       warnings = text_or_empty(report%warnings)
       if (len(self%reserve(bytes_at_end + len(warnings))) > 0) warnings = 'left out for want of room'
       call self%write_solver_report(report, error)
@@ -406,6 +408,21 @@ contains
       if (.not. allocated(error) .and. outcome /= status) &
          call raise(error, reason//' (rows until then are in '//self%path//')')
    end subroutine finish
+
+   !> A failed run takes the place of a failed run only. Whatever else has its name stays, and it is called PATH.failed.
+   subroutine step_aside(path)
+      character(len=:), allocatable, intent(inout) :: path !! of the result
+      type(hdf5_file) :: file
+      type(error_type), allocatable :: error
+      character(len=:), allocatable :: status
+
+      if (.not. path_exists(path)) return
+      status = ''
+      call file%open(path, error)
+      if (.not. allocated(error)) call file%get_attribute('/', 'status', status, error)
+      if (.not. allocated(error)) call file%close(error)
+      if (allocated(error) .or. status /= 'failed') path = path//'.failed'
+   end subroutine step_aside
 
    !> All data sets, coordinates attached, and the group `solver`.
    subroutine write_layout(self, compression, error)

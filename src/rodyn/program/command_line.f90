@@ -411,7 +411,8 @@ contains
                 '  The case may be a result of an earlier run: its stored input is run again (default: CASE-again.h5).'//nl// &
                 '  - reads it from standard input; that, or a pipe, gives the result no name: use --output.'//nl// &
                 '  --output FILE.h5   name of the result'//nl// &
-                '  --force            replace an existing result'//nl// &
+                '  --force            replace an existing result when the new one is complete; if it fails it is named'//nl// &
+                '                     FILE.h5.failed'//nl// &
                 '  --quiet            print nothing but errors'//nl// &
                 'Exit codes: 0 done, 1 the run failed (the file holds all rows until then), 2 bad input,'//nl// &
                 '75 stopped by SIGTERM, SIGUSR1 or SIGINT (rows until then in FILE.h5.stopped; run again).'
@@ -437,7 +438,8 @@ contains
                 '  --shard I/N        every N-th case, beginning with the I-th; the last shard to end merges all'//nl// &
                 '  --dry-run          print the table of cases, and an estimate of time and disk'//nl// &
                 '  --retry-failed     compute the failed cases again, and the missing ones'//nl// &
-                '  --force            discard what the directory holds of another sweep or an older one'//nl// &
+                '  --force            discard what the directory holds of another sweep or an older one; its sweep.h5'//nl// &
+                '                     stays as sweep.h5.before until the new one is there'//nl// &
                 '  --quiet            print nothing but errors'//nl// &
                 'Exit codes: 0 done, 1 a case failed (its states are NaN) or the sweep is incomplete, 2 bad input,'//nl// &
                 '75 stopped by SIGTERM, SIGUSR1 or SIGINT.'

@@ -45,7 +45,8 @@ module rodyn_run
 contains
 
    !> Run a case and write its file. On failure of the integration the file holds all rows until then, with
-   !> status 'failed'; on refused input nothing is written. A run that is asked to stop (see `watch_signals`) leaves
+   !> status 'failed', or `path`.failed where `force` is set and there is a result that has not failed; on refused input nothing
+   !> is written. A run that is asked to stop (see `watch_signals`) leaves
    !> its rows in `path`.stopped, so that the same call can be made again; of two stopped runs the more rows stay.
    subroutine run_case(config, path, error, input_text, force, quiet, load, name)
       type(case_config), intent(in) :: config
@@ -127,6 +128,7 @@ contains
       if (.not. (earlier .or. allocated(error))) &
          call close_file(recorder, driver, motion, config, failure, &
                       real(clock_end - clock_start, wp)/real(clock_rate, wp), error)
+      written = recorder%file%path ! a failed run may have stepped aside
       if (.not. silent .and. .not. allocated(error)) call print_events(motion)
       if (.not. silent .and. .not. allocated(error)) &
          call print_result(driver, recorder, written, config, t, &

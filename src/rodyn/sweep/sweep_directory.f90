@@ -4,6 +4,7 @@
 !>     DIR/lock          locked, never changed
 !>     DIR/shards/       results               DIR/journal/   what was done to them
 !>     DIR/status*.txt   how far it is         DIR/sweep.h5   the result
+!>     DIR/sweep.h5.before   the result that --force discards, until the new one is there
 !>
 !> The lock file's bytes are locked: 0 while somebody looks around, 1 by a sweep with all cases, N * 2^20 + I by shard I
 !> of N, and 2^50 + rank by the other ranks of an MPI job. The system drops the locks of a process when it ends, however
@@ -13,15 +14,15 @@ module rodyn_sweep_directory
    use rodyn_checksum, only: crc64_text
    use rodyn_errors, only: error_type, raise, exit_bad_input
    use rodyn_file_text, only: read_text_file
-   use rodyn_posix, only: path_exists, remove_file
+   use rodyn_posix, only: path_exists, remove_file, rename_over
    use rodyn_posix_files, only: list_directory, lock_file, lock_holder, make_directory, open_lock, release_lock, &
       take_lock, write_text_file
    use rodyn_text, only: ends_with, to_text
    implicit none (type, external)
    private
-   public :: sweep_directory, result_name
+   public :: sweep_directory, result_name, replaced_name
 
-   character(len=*), parameter :: result_name = 'sweep.h5'
+   character(len=*), parameter :: result_name = 'sweep.h5', replaced_name = 'sweep.h5.before'
    character(len=*), parameter :: nl = new_line('a')
    integer(i8), parameter :: looking = 0, whole = 1, per_count = 2_i8**20, first_rank = 2_i8**50
 
@@ -141,7 +142,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
       character(len=:), allocatable :: failure, old
 
-      if (force) call remove_all(self%path)
+      if (force) call remove_all(self%path, error)
+      if (allocated(error)) return
       if (path_exists(self%path//'/plan.txt')) then
          call read_text_file(self%path//'/plan.txt', old, error)
          if (allocated(error)) return
@@ -158,18 +160,24 @@ contains
       if (len(failure) > 0) call raise(error, self%path//'/plan.txt: cannot be written: '//failure)
    end subroutine settle_plan
 
-   !> Remove what a sweep makes, and nothing else. The plan goes last.
-   subroutine remove_all(path)
+   !> Remove what a sweep makes, and nothing else; its result waits for the new one. The plan goes last.
+   subroutine remove_all(path, error)
       character(len=*), intent(in) :: path
+      type(error_type), allocatable, intent(out) :: error
       character(len=:), allocatable :: failure
 
+      failure = ''
+      if (path_exists(path//'/'//result_name)) failure = rename_over(path//'/'//result_name, path//'/'//replaced_name)
+      if (len(failure) > 0) then
+         call raise(error, path//'/'//result_name//': cannot be set aside: '//failure)
+         return
+      end if
       call remove_in('/shards/', '.shard')
       call remove_in('/shards/', '.shard.open')
       call remove_in('/shards/', '.shard.tmp')
       call remove_in('/shards/', '.damaged')
       call remove_in('/journal/', '.txt')
       call remove_in('/', '.h5', 'sweep-')
-      call remove_in('/', '.h5', 'sweep.')
       call remove_in('/', '.h5.partial', 'sweep.')
       call remove_in('/', '.txt', 'status')
       call remove_in('/', '.txt', 'finished-s')

@@ -5,11 +5,11 @@
 module rodyn_sweep_result
    use rodyn_kinds, only: i8
    use rodyn_errors, only: error_type, raise
-   use rodyn_posix, only: parent_directory, path_exists, rename_new, sync_path
+   use rodyn_posix, only: parent_directory, path_exists, remove_file, rename_new, sync_path
    use rodyn_posix_files, only: file_checksum, rename_aside
    use rodyn_sweep_case, only: case_shape
    use rodyn_sweep_config, only: sweep_config
-   use rodyn_sweep_directory, only: result_name
+   use rodyn_sweep_directory, only: replaced_name, result_name
    use rodyn_sweep_index, only: sweep_index
    use rodyn_sweep_journal, only: write_journal
    use rodyn_sweep_merge, only: merge_sweep
@@ -61,6 +61,7 @@ contains
       if (len(failure) == 0) failure = sync_path(parent_directory(path))
       if (len(failure) > 0) call raise(error, path//': cannot be put onto the disk: '//failure// &
                                        '; all results are safe in the shards, run again to merge them')
+      if (len(failure) == 0) failure = remove_file(directory//'/'//replaced_name) ! if there is one
    end subroutine write_result
 
 end module rodyn_sweep_result

@@ -169,8 +169,12 @@ contains
       class(shard_writer), intent(in) :: self
       character(len=*), intent(in) :: failure
       type(error_type), allocatable, intent(out) :: error
-      call raise(error, self%name//open_ending//': results cannot be put onto the disk: '//failure// &
-                 '; run again to resume with all before them')
+      if (path_exists(parent_directory(self%name))) then
+         call raise(error, self%name//open_ending//': results cannot be put onto the disk: '//failure// &
+                    '; run again to resume with all before them')
+      else
+         call raise(error, self%directory//': was removed, and all results with it')
+      end if
    end subroutine tell
 
    !> Give an open shard its trailer, unless it has it, and its name. The file is closed then.
