@@ -2,12 +2,12 @@
 module test_oscillators
    use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
    use rodyn_kinds, only: wp, i8
-   use rodyn_ode, only: ode_system
+   use rodyn_ode, only: ode_system, n_quadratures
    implicit none (type, external)
    private
    public :: oscillator, new_oscillator
 
-   !> x'' = -w^2 x - d x' + f; the third state, when there is one, is the quadrature of v^2. Records what it was asked.
+   !> x'' = -w^2 x - d x' + f; behind x and v, if wanted, the quadratures of v^2 and of v. Records what it was asked.
    type, extends(ode_system) :: oscillator
       real(wp) :: frequency = 1.0_wp   !! w [rad/s]
       real(wp) :: damping = 0.0_wp     !! d [1/s]
@@ -23,14 +23,14 @@ module test_oscillators
 
 contains
 
-   !> An oscillator with or without its quadrature state.
-   function new_oscillator(frequency, quadrature) result(system)
+   !> An oscillator with or without quadratures.
+   function new_oscillator(frequency, quadratures) result(system)
       real(wp), intent(in) :: frequency !! [rad/s]
-      logical, intent(in) :: quadrature
+      logical, intent(in) :: quadratures
       type(oscillator) :: system
       system%frequency = frequency
       system%n_controlled = 2
-      system%n_states = merge(3, 2, quadrature)
+      system%n_states = merge(2 + n_quadratures, 2, quadratures)
    end function new_oscillator
 
    subroutine rhs(self, t, y, ydot, ok)
@@ -44,7 +44,7 @@ contains
       ok = t < self%t_refuse
       ydot(1) = y(2)
       ydot(2) = -self%frequency**2*y(1) - self%damping*y(2) + self%force
-      if (size(ydot) > 2) ydot(3) = y(2)**2
+      if (size(ydot) > 2) ydot(3:4) = [y(2)**2, y(2)]
       if (t >= self%t_nan) ydot(1) = ieee_value(1.0_wp, ieee_quiet_nan)
    end subroutine rhs
 

@@ -350,7 +350,7 @@ contains
       type(oscillator) :: system
       type(solver_options) :: options
       type(solver_statistics) :: without, with
-      real(wp) :: y_without(2), y_with(3)
+      real(wp) :: y_without(2), y_with(4)
       integer :: i
 
       do i = 1, size(methods)
@@ -359,7 +359,7 @@ contains
          call run(system, methods(i), options, 7.0_wp, 3, y_without, without, error)
          if (allocated(error)) return
          system = new_oscillator(3.0_wp, .true.)
-         y_with = [1.0_wp, 0.5_wp, 0.0_wp]
+         y_with = [1.0_wp, 0.5_wp, 0.0_wp, 0.0_wp]
          call run(system, methods(i), options, 7.0_wp, 3, y_with, with, error)
          if (allocated(error)) return
          call check_close(error, y_with(:2), y_without, 0.0_wp, methods(i))
@@ -374,17 +374,17 @@ contains
       type(oscillator) :: system
       type(solver_options) :: options
       type(solver_statistics) :: stats
-      real(wp) :: y(3)
+      real(wp) :: y(4)
       integer :: i
 
       options%rtol = 1.0e-10_wp
       options%atol = 1.0e-12_wp
       do i = 1, size(methods)
          system = new_oscillator(1.0_wp, .true.)
-         y = [1.0_wp, 0.0_wp, 0.0_wp]
+         y = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
          call run(system, methods(i), options, pi, 3, y, stats, error)
          if (allocated(error)) return
-         call check_close(error, y(3), 0.5_wp*pi, 1.0e-7_wp, methods(i))
+         call check_close(error, y(3:), [0.5_wp*pi, -2.0_wp], 1.0e-7_wp, methods(i))
          if (allocated(error)) return
       end do
    end subroutine quadrature_value
@@ -774,7 +774,7 @@ contains
       type(solver_statistics) :: stats
       type(solver_options) :: options
       integer(i8) :: before
-      real(wp) :: y(3)
+      real(wp) :: y(4)
       integer :: i, k
       integer(i8), parameter :: allowed_pages = 16
 
@@ -785,7 +785,7 @@ contains
          i = 1 + mod(k, size(methods))
          system = new_oscillator(1.0_wp, .true.)
          system%t_nan = 0.05_wp ! the failure path allocates a message
-         y = [1.0_wp, 0.0_wp, 0.0_wp]
+         y = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
          call run(system, methods(i), options, 10.0_wp, 1, y, stats, error)
       end do
       if (allocated(error)) deallocate (error)

@@ -91,6 +91,26 @@ def test_a_hopeless_case_of_a_sweep_fails_fast_and_alone(place, lanes):
         assert all(b"at t = " in m for m in file["message"][failed])
 
 
+# From rest, where powers are rounding alone: friction and a moment; a kink that begins to move.
+FROM_REST = {
+    "friction": "&case t_end = 20, n_outputs = 100 /\n&spacecraft mass = 120, inertia = 300, hinge_x = 0.6 /\n"
+                "&chain n_rods = 2, length = 1.2, 2, mass_per_length = 0.76, node_mass = 0.24, hinge_stiffness = 100, 12 /\n"
+                "&model bending = 'rigid' /\n&hinge hinge = 0, friction_moment = 0.34, friction_velocity = 0.1 /\n"
+                "&load component = 'M', t_start = 2.96, t_end = 8.97, value = 16 /\n",
+    "kink": "&case t_end = 0.31, n_outputs = 1 /\n&spacecraft mass = 82, inertia = 310, hinge_x = 0.2 /\n"
+            "&chain n_rods = 2, length = 2, mass_per_length = 2, bending_stiffness = 390, hinge_stiffness = 380 /\n"
+            "&kink_program hinge = 0, law = 'table', times = 0.3, 0.9, 1.5, values = 0, 0.21, 0.3 /\n",
+}
+
+
+@pytest.mark.parametrize("scene", FROM_REST)
+@pytest.mark.parametrize("method", ["adams", "bdf", "erk", "dop853"])
+def test_energies_of_a_chain_at_rest_are_no_endless_work(tmp_path, method, scene):
+    (tmp_path / "case.nml").write_text(FROM_REST[scene] + f"&solver method = '{method}' /\n")
+    ending = program.run(["run", "case.nml"], tmp_path)
+    assert program.fault(ending, {0}) == "" and ending.seconds < 5.0, ending.stderr
+
+
 def test_more_fixed_steps_than_permitted_are_refused(place):
     (place / "case.nml").write_text(CASE + "&solver method = 'dop853', fixed_step = 1e-300 /\n")
     refused(rodyn("check", "case.nml", cwd=place), "fixed_step = 1e-300: would make more than max_steps")

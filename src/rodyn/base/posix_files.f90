@@ -16,7 +16,7 @@ module rodyn_posix_files
    public :: write_words, read_words, write_text_file, append_text, file_bytes, file_checksum, rename_aside
    public :: create_file, write_all, o_append, o_wronly ! for `rodyn_growing_file`
    public :: lock_file, open_lock, take_lock, lock_holder, release_lock
-   public :: watch_signals, stop_signal
+   public :: watch_signals, stop_signal, is_stop_asked
 
    integer(c_int), parameter :: o_wronly = 1, o_append = 1024            ! <fcntl.h>, Linux
    integer(c_int), parameter :: f_getlk = 5, f_setlk = 6, f_setlkw = 7   ! <fcntl.h>, Linux, 64 bit
@@ -441,6 +441,11 @@ contains
       integer(c_int), value :: number
       caught = number
    end subroutine note_signal
+
+   !> Did a signal ask to stop? For loops, which allocate nothing.
+   logical function is_stop_asked()
+      is_stop_asked = findloc(watched, caught, dim=1) > 0
+   end function is_stop_asked
 
    !> Name of the signal that asks to stop; empty: none came.
    function stop_signal() result(name)

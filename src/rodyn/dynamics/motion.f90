@@ -8,7 +8,7 @@ module rodyn_motion
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type, raise
    use rodyn_lanes, only: lanes
-   use rodyn_ode, only: mechanical_system, factorise_dense, solve_dense
+   use rodyn_ode, only: mechanical_system, n_quadratures, factorise_dense, solve_dense
    use rodyn_stiff_modes, only: stiff_modes
    use rodyn_scene_modes, only: modes_finder, new_modes_finder
    use rodyn_trigonometry, only: sine_cosine
@@ -40,6 +40,7 @@ module rodyn_motion
       logical :: free = .true.         !! the spacecraft moves
       logical :: ledger = .true.       !! y ends with work and dissipated energy
       type(event_set) :: events        !! what hinges do, and did
+      real(wp), allocatable, private :: acceleration(:), joint_rate(:) !! workspace of `quadratures` (n_dof), (n_q - n_dof)
    contains
       procedure :: rhs
       procedure :: jacobian
@@ -77,7 +78,8 @@ contains
       motion%n_ignorable = scene%n_base
       motion%ledger = ledger
       motion%n_controlled = scene%n_q + scene%n_dof
-      motion%n_states = motion%n_controlled + merge(2, 0, ledger)
+      motion%n_states = motion%n_controlled + merge(n_quadratures, 0, ledger)
+      allocate (motion%acceleration(motion%n_dof), motion%joint_rate(motion%n_q - motion%n_dof))
       call new_event_set(motion%events, scene%hinges)
       motion%n_events = motion%events%n
    end subroutine new_motion
@@ -281,14 +283,13 @@ contains
       class(motion_type), intent(inout) :: self
       real(wp), intent(in) :: t
       real(wp), contiguous, intent(in) :: y(:)
-      real(wp), intent(out) :: rate(:)
+      real(wp), intent(out) :: rate(n_quadratures)
       logical, intent(out) :: ok
-      real(wp) :: acceleration(self%n_dof), joint_rate(self%n_q - self%n_dof)
 
       ok = .true.
-      associate (dynamics => self%dynamics, r => self%n_q, m => self%n_dof)
+      associate (dynamics => self%dynamics, r => self%n_q, m => self%n_dof, joint_rate => self%joint_rate)
          if (r > m .or. (dynamics%driven .and. has_slaves(dynamics%scene))) then
-            call dynamics%accelerations(t, y(1:r), y(r + 1:r + m), acceleration, ok)
+            call dynamics%accelerations(t, y(1:r), y(r + 1:r + m), self%acceleration, ok)
             if (r > m) call relaxation_rates(dynamics%scene%hinges, dynamics%work%moment, y(m + 1:r), joint_rate)
          else if (dynamics%varying) then
             call dynamics%refresh(t, y(1:r), y(r + 1:r + m))

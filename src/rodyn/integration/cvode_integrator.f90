@@ -11,12 +11,13 @@ module rodyn_cvode_integrator
    use, intrinsic :: iso_c_binding, only: c_ptr, c_int, c_long, c_double, c_null_ptr, c_associated, c_loc, c_funloc
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type, raise
-   use rodyn_ode, only: ode_system
+   use rodyn_ode, only: ode_system, n_quadratures
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, time_text
    use rodyn_event_search, only: find_event
+   use rodyn_quadrature_history, only: quadrature_history
    use rodyn_nvector, only: new_nvector, free_nvector, vector_content, content_of
    use rodyn_newton_solver, only: new_newton_matrix, new_newton_solver, linear_system_shim
-   use rodyn_sundials_base, only: callback_data, rhs_shim, weights_shim, quiet_handler, all_finite, raise_return_code
+   use rodyn_sundials_base, only: callback_data, rhs_shim, weights_shim, quiet_handler, all_finite, raise_return_code, stricter
    use fsundials_context_mod, only: FSUNContext_Create, FSUNContext_Free
    use fsundials_nvector_mod, only: N_Vector
    use fsundials_matrix_mod, only: SUNMatrix, FSUNMatDestroy
@@ -51,9 +52,9 @@ module rodyn_cvode_integrator
                                                                                          !! ends of the step; workspace
       type(solver_statistics) :: before_restart !! counts up to the last restart, which resets CVODE's
       real(wp) :: t_before = 0.0_wp                       !! start of the last internal step [s]
-      real(wp), allocatable :: sums_before(:)             !! quadratures there
-      real(wp), allocatable, dimension(:) :: rate_before, rate !! and their rates, there and at its end
-      real(wp), allocatable :: sum_of_errors(:)           !! of the last integral of `integrate_quadratures`
+      real(wp), dimension(n_quadratures) :: sums_before = 0.0_wp !! quadratures there
+      real(wp), dimension(n_quadratures) :: rate_before = 0.0_wp, rate = 0.0_wp !! and their rates, there and at its end
+      type(quadrature_history) :: history                 !! rates in the last steps
    contains
       procedure :: start
       procedure :: advance
@@ -99,33 +100,28 @@ contains
       self%multistep = merge(CV_ADAMS, CV_BDF, method == 'adams')
       allocate (self%data)
       self%data%system => system
-      associate (factor => stricter(method, options))
+      associate (factor => factor_of_tolerances(method, options))
          self%data%rtol = factor*options%rtol
          self%data%atol = factor*options%atol
       end associate
       call check(error, FSUNContext_Create(c_null_ptr, self%context), 'SUNContext_Create')
       if (allocated(error)) return
       self%state => new_nvector(system%n_controlled, system%n_controlled, self%context)
-      associate (n => system%n_states - system%n_controlled)
-         allocate (self%sums_before(n), self%rate_before(n), self%rate(n), self%sum_of_errors(n), source=0.0_wp)
-      end associate
       self%memory = FCVodeCreate(self%multistep, self%context)
       if (.not. (associated(self%state) .and. c_associated(self%memory))) call raise(error, 'CVodeCreate: out of memory')
    end subroutine new_cvode_integrator
 
-   !> The user's tolerances times this are CVODE's: steps shorter by a factor, whose errors are smaller by its power of order + 1.
-   !> With it `adams` and `bdf` come near the errors of `dop853` (docs/stability.md). Not below what rounding allows.
-   pure real(wp) function stricter(method, options)
+   !> With these steps `adams` and `bdf` come near the errors of `dop853` (docs/stability.md).
+   pure real(wp) function factor_of_tolerances(method, options) result(factor)
       character(len=*), intent(in) :: method
       type(solver_options), intent(in) :: options
-      real(wp), parameter :: shorter_adams = 0.8_wp, shorter_bdf = 0.52_wp, least_rtol = 1.0e-13_wp
+      real(wp), parameter :: shorter_adams = 0.8_wp, shorter_bdf = 0.52_wp
       integer :: order
 
       order = options%order
       if (order == 0) order = merge(highest_adams, highest_bdf, method == 'adams')
-      stricter = merge(shorter_adams, shorter_bdf, method == 'adams')**(order + 1)
-      stricter = max(stricter, min(1.0_wp, least_rtol/options%rtol))
-   end function stricter
+      factor = stricter(merge(shorter_adams, shorter_bdf, method == 'adams'), order + 1, options%rtol)
+   end function factor_of_tolerances
 
    !> First start, or exact restart: order one, no history.
    subroutine start(self, t, y, error)
@@ -140,8 +136,11 @@ contains
       if (allocated(error)) return
       content => content_of(self%state)
       content%values(:) = y(:self%system%n_controlled)
-      if (size(self%rate) > 0) call rates_of_quadratures(self, t, content%values, self%rate, error)
-      if (allocated(error)) return
+      if (self%system%has_quadratures()) then
+         call rates_of_quadratures(self, t, content%values, self%rate, error)
+         if (allocated(error)) return
+         call self%history%begin(t, self%rate)
+      end if
       if (self%initialized) then
          self%before_restart = self%statistics()
          call check(error, FCVodeReInit(self%memory, t, self%state), 'CVodeReInit', t)
@@ -237,7 +236,7 @@ contains
          if (.not. allocated(error)) then
             y(:self%system%n_controlled) = content%values
             t = t_out
-            if (size(self%rate) > 0) call quadratures_within(self, t_out, y, error)
+            if (self%system%has_quadratures()) call quadratures_within(self, t_out, y, error)
             if (.not. allocated(error)) return
          end if
       end if
@@ -284,27 +283,49 @@ contains
       self%y_good(:self%system%n_controlled) = content%values
       if (self%system%n_events > 0) call look_for_event(self, error)
       if (allocated(error)) return
-      if (size(self%rate) > 0) call add_quadratures(self, error)
+      if (self%system%has_quadratures()) call add_quadratures(self, error)
    end subroutine one_step
 
    !> Quadratures at the end of the step that CVODE has made. They are no states of CVODE's: its iterations and its error test
-   !> do not look at them. They are integrals over its polynomial.
+   !> do not look at them. They are integrals over its polynomial: by the rates in the last steps where these are smooth, which
+   !> takes two of them a step, else by as many as they need.
    subroutine add_quadratures(self, error)
       class(cvode_integrator), intent(inout) :: self
       type(error_type), allocatable, intent(inout) :: error
-      real(wp) :: increment(size(self%rate))
+      real(wp), dimension(n_quadratures) :: middle, increment, off, values
+      real(wp) :: t_middle, tolerance
+      logical :: ok
 
       associate (n => self%system%n_controlled)
-         self%sums_before(:) = self%y_good(n + 1:)
-         self%rate_before(:) = self%rate
+         self%sums_before = self%y_good(n + 1:)
+         self%rate_before = self%rate
+         t_middle = self%t_before + 0.5_wp*(self%t_good - self%t_before)
          call rates_of_quadratures(self, self%t_good, self%y_good(:n), self%rate, error)
+         if (.not. allocated(error)) call rates_within(self, t_middle, middle, error)
          if (allocated(error)) return
-         call integrate_quadratures(self, self%t_good, self%rate, increment, error)
+         call self%history%add(t_middle, middle, self%t_good, self%rate)
+         tolerance = self%system%quadrature_tolerance(self%options%rtol, self%sums_before)
+         call self%history%integrate(tolerance, increment, off, ok)
+         if (.not. ok) call integrate_quadratures(self, self%t_good, self%rate, increment, off, error)
          if (allocated(error)) return
-         self%y_good(n + 1:) = self%sums_before + increment
-         call self%system%note_quadratures(self%y_good(n + 1:), self%sum_of_errors)
+         values = self%sums_before + increment
+         self%y_good(n + 1:) = values
+         call self%system%note_quadratures(values, off)
       end associate
    end subroutine add_quadratures
+
+   !> Rates of the quadratures on CVODE's polynomial of the last step.
+   subroutine rates_within(self, t, rate, error)
+      class(cvode_integrator), intent(inout) :: self
+      real(wp), intent(in) :: t !! [s]
+      real(wp), intent(out) :: rate(n_quadratures)
+      type(error_type), allocatable, intent(inout) :: error
+      type(vector_content), pointer :: content
+
+      content => content_of(self%state)
+      call check(error, FCVodeGetDky(self%memory, t, 0_c_int, self%state), 'CVodeGetDky', t)
+      if (.not. allocated(error)) call rates_of_quadratures(self, t, content%values, rate, error)
+   end subroutine rates_within
 
    !> Quadratures at an output inside the last step.
    subroutine quadratures_within(self, t, y, error)
@@ -312,43 +333,46 @@ contains
       real(wp), intent(in) :: t !! [s]
       real(wp), contiguous, intent(inout) :: y(:)
       type(error_type), allocatable, intent(inout) :: error
-      real(wp), dimension(size(self%rate)) :: rate, increment
+      real(wp), dimension(n_quadratures) :: rate, increment, off
 
       associate (n => self%system%n_controlled)
          call rates_of_quadratures(self, t, y(:n), rate, error)
-         if (.not. allocated(error)) call integrate_quadratures(self, t, rate, increment, error)
+         if (.not. allocated(error)) call integrate_quadratures(self, t, rate, increment, off, error)
          if (.not. allocated(error)) y(n + 1:) = self%sums_before + increment
       end associate
    end subroutine quadratures_within
 
-   !> Integral of the rates of the quadratures from the start of the last step: a panel that is too long for them is halved.
-   subroutine integrate_quadratures(self, t_end, rate_end, total, error)
+   !> Integral of the rates of the quadratures from the start of the last step: a panel that is too long for them is halved, but
+   !> not without end: rates of a chain at rest are rounding alone, which no panel is short enough for.
+   subroutine integrate_quadratures(self, t_end, rate_end, total, total_off, error)
       class(cvode_integrator), intent(inout) :: self
       real(wp), intent(in) :: t_end       !! [s]
-      real(wp), intent(in) :: rate_end(:) !! there
-      real(wp), intent(out) :: total(:)
+      real(wp), intent(in) :: rate_end(n_quadratures) !! there
+      real(wp), dimension(n_quadratures), intent(out) :: total, total_off !! and the estimated error
       type(error_type), allocatable, intent(inout) :: error
-      integer, parameter :: deepest = 20 !! halvings
-      real(wp) :: ends(0:deepest), rates(size(total), 0:deepest) ! of panels that wait
-      real(wp), dimension(size(total)) :: first, middle, part, off
+      integer, parameter :: deepest = 20, most = 100 !! halvings; panels
+      real(wp) :: ends(0:deepest), rates(n_quadratures, 0:deepest) ! of panels that wait
+      real(wp), dimension(n_quadratures) :: first, middle, part, off
       real(wp) :: t, tolerance
-      integer :: depth
+      integer :: depth, panels
 
       depth = 0
+      panels = 0
       t = self%t_before
       first = self%rate_before
       ends(0) = t_end
       rates(:, 0) = rate_end
       total = 0.0_wp
-      self%sum_of_errors = 0.0_wp
+      total_off = 0.0_wp
       do while (depth >= 0)
          call integrate_panel(self, t, ends(depth), first, rates(:, depth), part, middle, off, error)
          if (allocated(error)) return
+         panels = panels + 1
          tolerance = max(self%system%quadrature_tolerance(self%options%rtol, self%sums_before + total + part), &
                          8.0_wp*epsilon(1.0_wp)*(t_end - self%t_before)*maxval(abs(middle)))
-         if (maxval(off) <= tolerance .or. depth == deepest) then
+         if (maxval(off) <= tolerance .or. depth == deepest .or. panels >= most) then
             total = total + part
-            self%sum_of_errors = self%sum_of_errors + off
+            total_off = total_off + off
             t = ends(depth)
             first = rates(:, depth)
             depth = depth - 1
@@ -365,25 +389,19 @@ contains
    subroutine integrate_panel(self, t0, t1, first, last, value, middle, off, error)
       class(cvode_integrator), intent(inout) :: self
       real(wp), intent(in) :: t0, t1           !! [s]
-      real(wp), intent(in) :: first(:), last(:) !! rates there
-      real(wp), intent(out) :: value(:), middle(:), off(:) !! integrals; rates in the middle; estimated errors
+      real(wp), dimension(n_quadratures), intent(in) :: first, last          !! rates there
+      real(wp), dimension(n_quadratures), intent(out) :: value, middle, off !! integrals; rates in the middle; estimated errors
       type(error_type), allocatable, intent(inout) :: error
       real(wp), parameter :: outer = sqrt(2.0_wp/3.0_wp), inner = sqrt(0.2_wp)
       real(wp), parameter :: points(5) = [-outer, -inner, 0.0_wp, inner, outer]
-      type(vector_content), pointer :: content
-      real(wp) :: rates(size(value), 5), half
-      real(wp), dimension(size(value)) :: lobatto, simpson
+      real(wp) :: rates(n_quadratures, 5), half
+      real(wp), dimension(n_quadratures) :: lobatto, simpson
       integer :: i
 
       half = 0.5_wp*(t1 - t0)
-      content => content_of(self%state)
       do i = 1, 5
-         associate (t => t0 + half*(1.0_wp + points(i)))
-            call check(error, FCVodeGetDky(self%memory, t, 0_c_int, self%state), 'CVodeGetDky', t)
-            if (allocated(error)) return
-            call rates_of_quadratures(self, t, content%values, rates(:, i), error)
-            if (allocated(error)) return
-         end associate
+         call rates_within(self, t0 + half*(1.0_wp + points(i)), rates(:, i), error)
+         if (allocated(error)) return
       end do
       middle = rates(:, 3)
       value = (half/1470.0_wp)*(77.0_wp*(first + last) + 432.0_wp*(rates(:, 1) + rates(:, 5)) + &
@@ -398,7 +416,7 @@ contains
       class(cvode_integrator), intent(inout) :: self
       real(wp), intent(in) :: t                !! [s]
       real(wp), contiguous, intent(in) :: y(:) !! (n_controlled)
-      real(wp), intent(out) :: rate(:)
+      real(wp), intent(out) :: rate(n_quadratures)
       type(error_type), allocatable, intent(inout) :: error
       logical :: ok
       call self%system%quadratures(t, y, rate, ok)

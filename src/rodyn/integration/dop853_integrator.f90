@@ -9,7 +9,7 @@ module rodyn_dop853_integrator
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type, raise
-   use rodyn_ode, only: ode_system
+   use rodyn_ode, only: ode_system, n_quadratures
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, time_text
    use rodyn_event_search, only: find_event
    use rodyn_dop853_step, only: n_stages, stages, add_increment, error_norm, quadrature_errors
@@ -30,7 +30,7 @@ module rodyn_dop853_integrator
       real(wp), allocatable :: y_before(:), f_before(:) !! at t_before
       real(wp), allocatable :: k(:, :)   !! rates of the stages (n_states, 12)
       real(wp), allocatable :: stage(:), increment(:), y_new(:) !! workspace
-      real(wp), allocatable :: quadrature_error(:) !! in the last step (n_states - n_controlled)
+      real(wp) :: quadrature_error(n_quadratures) = 0.0_wp !! in the last step
       type(quadrature_refinement) :: refinement
       real(wp) :: t_first = 0.0_wp       !! start of the interval, where the grid of fixed steps begins [s]
       integer(i8) :: n_grid = 0, i_grid = 0 !! fixed steps of the interval; steps done
@@ -62,7 +62,7 @@ contains
       self%options = options
       associate (n => system%n_states)
          allocate (self%y(n), self%lost(n), self%f(n), self%y_before(n), self%f_before(n), self%k(n, n_stages), &
-                   self%stage(n), self%increment(n), self%y_new(n), self%quadrature_error(n - system%n_controlled), source=0.0_wp)
+                   self%stage(n), self%increment(n), self%y_new(n), source=0.0_wp)
       end associate
       self%counts%last_order = 8
    end subroutine new_dop853_integrator
@@ -135,7 +135,7 @@ contains
          call stages(self%system, size(y), self%t_before, h, self%y_before, self%f_before, self%k, self%stage, ok)
          self%counts%n_rhs = self%counts%n_rhs + n_stages - 1
          call add_increment(size(y), h, self%k, self%increment)
-         if (size(self%quadrature_error) > 0) call control_quadratures(self, self%t_before, h, self%y_before)
+         if (self%system%has_quadratures()) call control_quadratures(self, self%t_before, h, self%y_before)
          y = self%y_before + self%increment
       end associate
    end subroutine state_within
@@ -146,13 +146,14 @@ contains
       class(dop853_integrator), intent(inout) :: self
       real(wp), intent(in) :: t, h !! [s]
       real(wp), intent(in) :: y(:) !! at the start of the step
-      real(wp) :: tolerance
+      real(wp) :: values(n_quadratures), tolerance
       logical :: ok
 
       associate (m => self%system%n_controlled, options => self%options, error => self%quadrature_error)
          call quadrature_errors(m, h, self%k, error)
          if (self%n_grid > 0) return
-         tolerance = self%system%quadrature_tolerance(options%rtol, y(m + 1:) + self%increment(m + 1:))
+         values = y(m + 1:) + self%increment(m + 1:)
+         tolerance = self%system%quadrature_tolerance(options%rtol, values)
          if (maxval(error) <= tolerance) return
          call self%refinement%refine(self%system, t, y, t + h, options%rtol, options%atol, tolerance, &
                                      self%increment(m + 1:), error, self%counts%n_rhs, ok)
@@ -215,7 +216,7 @@ contains
          rejected = .true.
          self%h = h*max(shrink, safety*norm**(-0.125_wp))
       end do
-      if (size(self%quadrature_error) > 0) then
+      if (self%system%has_quadratures()) then
          call control_quadratures(self, self%t, h, self%y)
          associate (last => self%system%n_controlled + 1)
             self%y_new(last:) = self%y(last:) + (self%increment(last:) - self%lost(last:))

@@ -17,7 +17,7 @@ module rodyn_gauss_integrator
    use rodyn_kinds, only: wp, i8
    use rodyn_lanes, only: s => lanes
    use rodyn_errors, only: error_type, raise
-   use rodyn_ode, only: ode_system, mechanical_system
+   use rodyn_ode, only: ode_system, mechanical_system, n_quadratures
    use rodyn_stiff_modes, only: stiff_modes
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, time_text
    use rodyn_trigonometry, only: sine_cosine
@@ -74,9 +74,8 @@ module rodyn_gauss_integrator
       real(wp), allocatable :: modal(:, :), reply(:, :), stiff(:, :) !! workspace (s, modes)
       real(wp), allocatable :: rest(:), motion(:) !! v.q and v.p at the start of a step (modes)
       real(wp), allocatable :: guess(:, :)   !! workspace (s, n_dof)
-      real(wp), allocatable :: node_state(:), node_rate(:) !! workspace: (q, p) at one node; rates of the quadratures there
-      real(wp), allocatable :: power(:, :)   !! rates of the quadratures at the nodes of a step (s, n_states - 2 n_dof)
-      real(wp), allocatable :: quadrature_error(:) !! in the last step (n_states - 2 n_dof)
+      real(wp), allocatable :: node_state(:) !! workspace: (q, p) at one node
+      real(wp) :: quadrature_error(n_quadratures) = 0.0_wp !! in the last step
       type(quadrature_refinement) :: refinement
       logical :: refines = .true.            !! quadratures whose errors are too large
       real(wp), allocatable :: weight(:)     !! 1/tolerance of the rates (n_dof)
@@ -136,8 +135,7 @@ contains
       allocate (self%now, self%spare)
       associate (n => system%n_states, m => self%mechanics%n_dof)
          allocate (self%y(n), self%lost(n), self%y_before(n), self%increment(n), self%weight(m), self%guess(s, m), &
-                   self%node_state(2*m), self%node_rate(n - 2*m), self%power(s, n - 2*m), self%quadrature_error(n - 2*m), &
-                   source=0.0_wp)
+                   self%node_state(2*m), source=0.0_wp)
          call allocate_record(self%last, m)
          call allocate_record(self%trial, m)
       end associate
@@ -231,7 +229,7 @@ contains
       call iterate(self, self%t_before, self%y_before, ok)
       self%rate = rate
       call form_increment(self, self%y_before)
-      if (size(self%quadrature_error) > 0) call add_quadratures(self, self%t_before, self%y_before)
+      if (self%system%has_quadratures()) call add_quadratures(self, self%t_before, self%y_before)
       y = self%y_before + self%increment
       call swap_matrices(self%now, self%spare)
    end subroutine inner_state
@@ -289,9 +287,9 @@ contains
          end if
       end do
       if (modulo(self%n_steps, degree_interval) == 0) call choose_degree(self)
-      if (size(self%quadrature_error) > 0) call add_quadratures(self, self%t, self%y)
+      if (self%system%has_quadratures()) call add_quadratures(self, self%t, self%y)
       call accept(self, h, t_new)
-      if (size(self%quadrature_error) > 0) &
+      if (self%system%has_quadratures()) &
          call self%system%note_quadratures(self%y(self%system%n_controlled + 1:), self%quadrature_error)
       self%excess = self%excess + real(self%iterations - self%fewest, wp)
       self%fewest = min(self%fewest, self%iterations)
@@ -668,6 +666,8 @@ contains
       class(gauss_integrator), intent(inout) :: self
       real(wp), intent(in) :: t    !! at the start of the step [s]
       real(wp), intent(in) :: y(:) !! there
+      real(wp) :: power(s, n_quadratures) ! rates at the nodes
+      real(wp), dimension(n_quadratures) :: rate, values
       real(wp) :: tolerance
       logical :: ok
       integer :: i
@@ -676,15 +676,16 @@ contains
          do i = 1, s
             self%node_state(:m) = self%trial%q(i, :)
             self%node_state(m + 1:) = self%trial%p(i, :)
-            call self%system%quadratures(t + h*self%rule%c(i), self%node_state, self%node_rate, ok)
-            self%power(i, :) = self%node_rate
+            call self%system%quadratures(t + h*self%rule%c(i), self%node_state, rate, ok)
+            power(i, :) = rate
          end do
-         do i = 1, size(error)
-            self%increment(2*m + i) = h*sum(self%rule%b*self%power(:, i))
-            error(i) = h*neglected(matmul(self%rule%coefficients, self%power(:, i)))
+         do i = 1, n_quadratures
+            self%increment(2*m + i) = h*sum(self%rule%b*power(:, i))
+            error(i) = h*neglected(matmul(self%rule%coefficients, power(:, i)))
          end do
          if (self%n_grid > 0) return
-         tolerance = self%system%quadrature_tolerance(self%options%rtol, y(2*m + 1:) + self%increment(2*m + 1:))
+         values = y(2*m + 1:) + self%increment(2*m + 1:)
+         tolerance = self%system%quadrature_tolerance(self%options%rtol, values)
          if (maxval(error) <= tolerance) return
          call compare_halves(self, t)
          if (maxval(error) <= tolerance .or. .not. self%refines) return
@@ -699,7 +700,8 @@ contains
    subroutine compare_halves(self, t)
       class(gauss_integrator), intent(inout) :: self
       real(wp), intent(in) :: t !! at the start of the step [s]
-      real(wp) :: matrix(s, s), both(size(self%quadrature_error))
+      real(wp) :: matrix(s, s)
+      real(wp), dimension(n_quadratures) :: both, rate
       logical :: ok
       integer :: half, i
 
@@ -712,11 +714,11 @@ contains
             do i = 1, s
                self%node_state(:m) = self%guess(i, :)
                self%node_state(m + 1:) = self%trial%a(i, :)
-               call self%system%quadratures(t + h*(0.5_wp*half + 0.5_wp*self%rule%c(i)), self%node_state, self%node_rate, ok)
-               both = both + 0.5_wp*h*self%rule%b(i)*self%node_rate
+               call self%system%quadratures(t + h*(0.5_wp*half + 0.5_wp*self%rule%c(i)), self%node_state, rate, ok)
+               both = both + 0.5_wp*h*self%rule%b(i)*rate
             end do
          end do
-         self%quadrature_error(:) = min(self%quadrature_error, abs(both - self%increment(2*m + 1:)))
+         self%quadrature_error = min(self%quadrature_error, abs(both - self%increment(2*m + 1:)))
       end associate
    end subroutine compare_halves
 

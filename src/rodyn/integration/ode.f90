@@ -6,8 +6,11 @@ module rodyn_ode
    use rodyn_stiff_modes, only: stiff_modes
    implicit none (type, external)
    private
-   public :: ode_system, mechanical_system
+   public :: ode_system, mechanical_system, n_quadratures
    public :: factorise_dense, solve_dense
+
+   !> Of a system that has any: work and dissipated energy. A constant, so that sums of them need no memory from the heap.
+   integer, parameter :: n_quadratures = 2
 
    !> A system of `n_controlled` equations, and quadratures behind them (work, dissipated energy), `n_states` in all. No equation
    !> depends on a quadrature, so a run with them makes the same steps as one without. Their error is controlled apart: that of
@@ -21,9 +24,10 @@ module rodyn_ode
       integer :: n_events = 0     !! functions whose sign changes end the smooth part of the run
       real(wp) :: quadrature_base = 0.0_wp  !! what quadratures are compared with beside themselves, of their unit
       real(wp) :: quadrature_scale = 0.0_wp !! the largest sum of that and their absolute values so far
-      real(wp), allocatable :: quadrature_error(:) !! their estimated errors, summed over the steps (n_states - n_controlled)
+      real(wp) :: quadrature_error(n_quadratures) = 0.0_wp !! their estimated errors, summed over the steps
       type(dense_newton), private :: dense
    contains
+      procedure :: has_quadratures
       procedure :: quadratures
       procedure :: begin_quadratures
       procedure :: quadrature_tolerance
@@ -105,6 +109,12 @@ module rodyn_ode
 
 contains
 
+   !> True if quadratures stand behind the controlled states.
+   pure logical function has_quadratures(self)
+      class(ode_system), intent(in) :: self
+      has_quadratures = self%n_states > self%n_controlled
+   end function has_quadratures
+
    !> Values that are positive while the present right-hand side holds; where one becomes negative, integration stops for the
    !> system to change. A system with `n_events` > 0 overrides this.
    subroutine event_functions(self, t, y, values)
@@ -121,7 +131,7 @@ contains
       class(ode_system), intent(inout) :: self
       real(wp), intent(in) :: t                !! [s]
       real(wp), contiguous, intent(in) :: y(:) !! states (n_controlled)
-      real(wp), intent(out) :: rate(:)         !! (n_states - n_controlled)
+      real(wp), intent(out) :: rate(n_quadratures)
       logical, intent(out) :: ok
       real(wp) :: ydot(self%n_states), all_of_y(self%n_states)
 
@@ -137,24 +147,23 @@ contains
       real(wp), intent(in) :: base !! what they are compared with beside themselves, >= 0
       self%quadrature_base = base
       self%quadrature_scale = 0.0_wp
-      self%quadrature_error = spread(0.0_wp, 1, self%n_states - self%n_controlled)
+      self%quadrature_error = 0.0_wp
    end subroutine begin_quadratures
 
    !> The error that a step to these values may make; 0: none is known.
    pure real(wp) function quadrature_tolerance(self, rtol, values) result(tolerance)
       class(ode_system), intent(in) :: self
       real(wp), intent(in) :: rtol
-      real(wp), intent(in) :: values(:) !! (n_states - n_controlled)
+      real(wp), intent(in) :: values(n_quadratures)
       tolerance = rtol*max(self%quadrature_scale, self%quadrature_base + sum(abs(values)))
    end function quadrature_tolerance
 
    !> A step to these values is done, with so much of an error.
    subroutine note_quadratures(self, values, error)
       class(ode_system), intent(inout) :: self
-      real(wp), intent(in) :: values(:), error(:) !! (n_states - n_controlled)
-      if (.not. allocated(self%quadrature_error)) call self%begin_quadratures(self%quadrature_base)
+      real(wp), intent(in) :: values(n_quadratures), error(n_quadratures)
       self%quadrature_scale = max(self%quadrature_scale, self%quadrature_base + sum(abs(values)))
-      self%quadrature_error(:) = self%quadrature_error + error
+      self%quadrature_error = self%quadrature_error + error
    end subroutine note_quadratures
 
    !> Factor 1 - gamma df/dy.

@@ -4,7 +4,7 @@ module rodyn_progress
    use, intrinsic :: iso_c_binding, only: c_int
    use rodyn_kinds, only: wp, i8
    use rodyn_text, only: formatted
-   use rodyn_posix_files, only: stop_signal
+   use rodyn_posix_files, only: is_stop_asked
    use rodyn_integrator, only: monitor_type, time_text
    implicit none (type, external)
    private
@@ -90,7 +90,7 @@ contains
       class(progress_monitor), intent(in) :: self
       logical :: requested
       associate (unused => self); end associate
-      requested = len(stop_signal()) > 0
+      requested = is_stop_asked()
    end function signal_came
 
    !> Wipe the line from a terminal, so that what follows starts at the margin.

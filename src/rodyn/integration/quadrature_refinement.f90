@@ -3,7 +3,7 @@
 module rodyn_quadrature_refinement
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp, i8
-   use rodyn_ode, only: ode_system
+   use rodyn_ode, only: ode_system, n_quadratures
    use rodyn_dop853_step, only: n_stages, stages, add_increment, error_norm, quadrature_errors
    implicit none (type, external)
    private
@@ -16,7 +16,8 @@ module rodyn_quadrature_refinement
    type :: quadrature_refinement
       private
       real(wp), allocatable :: k(:, :)                       !! rates of the stages (n_states, 12)
-      real(wp), allocatable, dimension(:) :: y, f, stage, increment, y_new, trial !! (n_states); errors of the quadratures
+      real(wp), allocatable, dimension(:) :: y, f, stage, increment, y_new !! (n_states)
+      real(wp) :: trial(n_quadratures) = 0.0_wp              !! errors of the quadratures in a step
    contains
       procedure :: refine
    end type quadrature_refinement
@@ -31,14 +32,14 @@ contains
       real(wp), intent(in) :: y(:)             !! (n_states)
       real(wp), intent(in) :: rtol, atol       !! of the motion
       real(wp), intent(in) :: tolerance        !! of the quadratures, in each of the shorter steps
-      real(wp), intent(inout) :: integral(:)   !! (n_states - n_controlled); unchanged unless ok
-      real(wp), intent(inout) :: error(:)      !! and the estimated error
+      real(wp), intent(inout) :: integral(n_quadratures) !! unchanged unless ok
+      real(wp), intent(inout) :: error(n_quadratures)    !! and the estimated error
       integer(i8), intent(inout) :: n_rhs      !! is increased
       logical, intent(out) :: ok               !! false: the motion cannot be followed in so many steps
-      real(wp) :: sum_of_errors(size(error)), now, h, norm
+      real(wp) :: sum_of_errors(n_quadratures), now, h, norm
       integer :: i
 
-      if (.not. allocated(self%k)) call reserve(self, size(y), size(error))
+      if (.not. allocated(self%k)) call reserve(self, size(y))
       self%y(:) = y
       self%y(system%n_controlled + 1:) = 0.0_wp
       sum_of_errors = 0.0_wp
@@ -67,12 +68,11 @@ contains
       error = sum_of_errors
    end subroutine refine
 
-   subroutine reserve(self, n, n_quadratures)
+   subroutine reserve(self, n)
       type(quadrature_refinement), intent(inout) :: self
-      integer, intent(in) :: n, n_quadratures
+      integer, intent(in) :: n
       allocate (self%k(n, n_stages), source=0.0_wp)
       allocate (self%y(n), self%f(n), self%stage(n), self%increment(n), self%y_new(n), source=0.0_wp)
-      allocate (self%trial(n_quadratures), source=0.0_wp)
    end subroutine reserve
 
    !> One of the shorter steps. The error of the motion in it counts, too.

@@ -4,13 +4,13 @@ module rodyn_sundials_base
       c_f_pointer, c_loc, c_associated
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type, raise
-   use rodyn_ode, only: ode_system
+   use rodyn_ode, only: ode_system, n_quadratures
    use rodyn_integrator, only: time_text
    use rodyn_nvector, only: vector_content, content_of
    use fsundials_nvector_mod, only: N_Vector
    implicit none (type, external)
    private
-   public :: callback_data, rhs_shim, weights_shim, quiet_handler, all_finite, raise_return_code, sundials_version
+   public :: callback_data, rhs_shim, weights_shim, quiet_handler, all_finite, raise_return_code, sundials_version, stricter
 
    !> What the callbacks find behind `user_data`.
    type :: callback_data
@@ -19,6 +19,7 @@ module rodyn_sundials_base
       real(wp) :: atol = 0.0_wp
       integer(i8) :: n_rhs = 0       !! calls of the right-hand side
       real(wp), allocatable :: recent(:, :) !! rates of the quadratures in the last calls, in turn, if somebody wants them
+                                            !! (n_quadratures, calls)
       integer :: latest = 0          !! column of the last call
       logical :: refused = .false.   !! the last call said ok = .false.
       logical :: not_finite = .false. !! the last call gave NaN or infinity
@@ -54,6 +55,16 @@ module rodyn_sundials_base
 
 contains
 
+   !> The user's tolerances times this are the library's: as much as makes steps shorter by a factor, their errors, the next power of
+   !> the step after the order's, by its power. Not below what rounding allows.
+   pure real(wp) function stricter(shorter, power, rtol)
+      real(wp), intent(in) :: shorter !! < 1
+      integer, intent(in) :: power    !! of the step in the error that is tested
+      real(wp), intent(in) :: rtol    !! the user's
+      real(wp), parameter :: least_rtol = 1.0e-13_wp
+      stricter = max(shorter**power, min(1.0_wp, least_rtol/rtol))
+   end function stricter
+
    !> CVRhsFn and ARKRhsFn: 0 done, 1 recoverable (the step may be shortened).
    function rhs_shim(t, y, ydot, user_data) result(flag) bind(c)
       real(c_double), intent(in), value :: t
@@ -64,6 +75,7 @@ contains
       type(callback_data), pointer :: data
       type(vector_content), pointer :: states, rates
       logical :: ok
+      integer :: i
 
       call c_f_pointer(user_data, data)
       states => content_of(y)
@@ -72,7 +84,9 @@ contains
       call data%system%rhs(t, states%values, rates%values, ok)
       if (allocated(data%recent)) then
          data%latest = modulo(data%latest, size(data%recent, 2)) + 1
-         data%recent(:, data%latest) = rates%values(data%system%n_controlled + 1:)
+         do i = 1, n_quadratures ! one by one: an array behind pointers would be copied through the heap
+            data%recent(i, data%latest) = rates%values(data%system%n_controlled + i)
+         end do
       end if
       flag = 0_c_int
       if (ok) then

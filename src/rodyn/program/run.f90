@@ -223,7 +223,7 @@ contains
       report%n_nonlinear_failures = stats%n_nonlinear_failures
       report%n_error_test_failures = stats%n_error_test_failures
       report%n_restarts = max(0_i8, stats%n_starts - 1_i8)
-      if (allocated(motion%quadrature_error)) then
+      if (motion%ledger) then
          report%work_external_error = motion%quadrature_error(1)
          report%energy_dissipated_error = motion%quadrature_error(2)
       end if
