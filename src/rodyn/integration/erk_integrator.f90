@@ -6,18 +6,19 @@
 !>
 !> The tables are SUNDIALS' own: Heun-Euler 2(1), Bogacki-Shampine 3(2), Zonneveld 4(3), Cash-Karp 5(4), Verner 6(5),
 !> Fehlberg 8(7); order 7 is Fehlberg's pair with its two solutions exchanged. Fehlberg's error estimate is blind to
-!> pure quadratures, y' = f(t); those behind the states have one of their own. A right-hand side that cannot be evaluated
-!> ends an ERKStep run at once, without trying a shorter step.
+!> pure quadratures, y' = f(t), such as a motion that loads alone drive; so order 6 is the default, the highest of those that see
+!> everything. Quadratures behind the states have an estimate of their own. A right-hand side that cannot be evaluated ends an
+!> ERKStep run at once, without trying a shorter step.
 module rodyn_erk_integrator
    use, intrinsic :: iso_c_binding, only: c_ptr, c_int, c_long, c_double, c_null_ptr, c_associated, c_loc, c_funloc, c_f_pointer
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type, raise
-   use rodyn_ode, only: ode_system
+   use rodyn_ode, only: ode_system, n_quadratures
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, time_text
    use rodyn_nvector, only: new_nvector, free_nvector, vector_content, content_of
    use rodyn_event_search, only: find_event
    use rodyn_quadrature_refinement, only: quadrature_refinement
-   use rodyn_sundials_base, only: callback_data, rhs_shim, weights_shim, quiet_handler, all_finite, raise_return_code
+   use rodyn_sundials_base, only: callback_data, rhs_shim, weights_shim, quiet_handler, all_finite, raise_return_code, stricter
    use fsundials_context_mod, only: FSUNContext_Create, FSUNContext_Free
    use fsundials_nvector_mod, only: N_Vector
    use farkode_mod, only: ARK_SUCCESS, ARK_TSTOP_RETURN, ARK_ONE_STEP, ARKODE_HEUN_EULER_2_1_2, &
@@ -31,7 +32,8 @@ module rodyn_erk_integrator
    private
    public :: erk_integrator, new_erk_integrator, erk_tableau
 
-   integer, parameter :: lowest_order = 2, highest_order = 8
+   integer, parameter :: lowest_order = 2, highest_order = 8, default_order = 6
+   real(wp), parameter :: shorter = 0.7_wp !! steps than ARKODE would make with the user's tolerances
 
    !> struct ARKodeButcherTableMem of arkode_butcher.h
    type, bind(c) :: butcher_table
@@ -48,14 +50,14 @@ module rodyn_erk_integrator
       integer :: order = 0
       real(wp), allocatable :: a(:, :)        !! (stages, stages): a(j, i) multiplies rate j in stage i
       real(wp), allocatable :: b(:), c(:)     !! (stages)
-      real(wp), allocatable :: b_other(:)     !! weights of the embedded method (stages)
+      real(wp), allocatable :: b_error(:)     !! less those of the embedded method (stages)
       real(wp), allocatable :: rates(:, :)    !! of the stages of an output step (n_states, stages)
       real(wp) :: t_before = 0.0_wp           !! start of the last internal step [s]
       real(wp), allocatable :: y_before(:)    !! state there (n_states)
       real(wp), allocatable, dimension(:) :: f_before, f_now, y_event !! for events: rates at both ends of the step; workspace
-      real(wp), allocatable :: rate(:)        !! rates of the quadratures at the end of the last internal step
-      real(wp), allocatable :: power(:, :)    !! and in its stages (n_states - n_controlled, stages)
-      real(wp), allocatable :: quadrature_error(:) !! of the last step, or output step (n_states - n_controlled)
+      real(wp) :: rate(n_quadratures) = 0.0_wp !! rates of the quadratures at the end of the last internal step
+      real(wp), allocatable :: power(:, :)    !! and in its stages (n_quadratures, stages)
+      real(wp) :: quadrature_error(n_quadratures) = 0.0_wp !! of the last step, or output step
       type(quadrature_refinement) :: refinement
       real(wp) :: t_first = 0.0_wp            !! start of the interval, where the grid of fixed steps begins [s]
       integer(i8) :: n_grid = 0, i_grid = 0   !! fixed steps of the interval; steps done
@@ -94,23 +96,23 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       self%order = options%order
-      if (self%order == 0) self%order = highest_order
+      if (self%order == 0) self%order = default_order
       if (self%order < lowest_order .or. self%order > highest_order) then
-         call raise(error, 'order: ''erk'' takes 2 to 8, or 0 for 8')
+         call raise(error, 'order: ''erk'' takes 2 to 8, or 0 for 6')
          return
       end if
       self%system => system
       self%options = options
       allocate (self%data)
       self%data%system => system
-      self%data%rtol = options%rtol
-      self%data%atol = options%atol
+      ! Errors of a step add up from period to period of a vibration; with steps so much shorter they stay near those of `dop853`.
+      associate (factor => stricter(shorter, merge(8, self%order, self%order >= 7), options%rtol))
+         self%data%rtol = factor*options%rtol
+         self%data%atol = factor*options%atol
+      end associate
       call check(error, FSUNContext_Create(c_null_ptr, self%context), 'SUNContext_Create')
       if (allocated(error)) return
       self%state => new_nvector(system%n_states, system%n_controlled, self%context)
-      associate (n => system%n_states - system%n_controlled)
-         allocate (self%rate(n), self%quadrature_error(n), source=0.0_wp)
-      end associate
       if (.not. associated(self%state)) call raise(error, 'N_VNewEmpty: out of memory')
    end subroutine new_erk_integrator
 
@@ -133,7 +135,7 @@ contains
       self%stop_in_force = -huge(1.0_wp)
       if (self%system%n_events > 0) call begin_events(self, error)
       if (allocated(error)) return
-      if (size(self%rate) > 0) call self%system%quadratures(t, self%y_good(:self%system%n_controlled), self%rate, ok)
+      if (self%system%has_quadratures()) call self%system%quadratures(t, self%y_good(:self%system%n_controlled), self%rate, ok)
       if (c_associated(self%memory)) then
          self%before_restart = self%statistics()
          call check(error, FERKStepReInit(self%memory, c_funloc(rhs_shim), t, self%state), 'ERKStepReInit', t)
@@ -182,10 +184,11 @@ contains
 
       call load_table(self%order, address, error)
       if (allocated(error)) return
-      call copy_table(address, self%a, self%b, self%c, self%b_other)
+      call copy_table(address, self%a, self%b, self%c, self%b_error)
+      self%b_error(:) = self%b - self%b_error
       allocate (self%rates(self%system%n_states, size(self%b)))
-      if (size(self%rate) > 0) allocate (self%power(size(self%rate), size(self%b)), &
-                                         self%data%recent(size(self%rate), size(self%b)), source=0.0_wp)
+      if (self%system%has_quadratures()) allocate (self%power(n_quadratures, size(self%b)), &
+                                                   self%data%recent(n_quadratures, size(self%b)), source=0.0_wp)
       call check(error, FERKStepSetTable(self%memory, address), 'ERKStepSetTable')
       call FARKodeButcherTable_Free(address)
    end subroutine choose_table
@@ -199,7 +202,7 @@ contains
 
       type(c_ptr) :: address
 
-      call load_table(merge(highest_order, order, order == 0), address, error)
+      call load_table(merge(default_order, order, order == 0), address, error)
       if (allocated(error)) return
       call copy_table(address, a, b, c)
       call FARKodeButcherTable_Free(address)
@@ -367,22 +370,28 @@ contains
       self%y_before(:) = self%y_good
       self%t_good = t_reached(1)
       self%y_good(:) = content%values
-      if (size(self%rate) > 0) call add_quadratures(self)
+      if (self%system%has_quadratures()) call add_quadratures(self)
       if (self%system%n_events > 0) call look_for_event(self, error)
    end subroutine one_step
 
    !> Quadratures at the end of the last internal step, from the rates in its stages, which are those of the last calls.
    subroutine add_quadratures(self)
       class(erk_integrator), intent(inout) :: self
-      integer :: j, n, back
+      integer :: i, j, n, back
 
       n = size(self%b)
       back = merge(0, 1, first_same_as_last(self)) ! else a call at the new state follows the stages
       self%power(:, 1) = self%rate
       do j = 2, n
-         self%power(:, j) = self%data%recent(:, modulo(self%data%latest - 1 - back - (n - j), n) + 1)
+         associate (call => modulo(self%data%latest - 1 - back - (n - j), n) + 1)
+            do i = 1, n_quadratures
+               self%power(i, j) = self%data%recent(i, call)
+            end do
+         end associate
       end do
-      self%rate(:) = self%data%recent(:, self%data%latest)
+      do i = 1, n_quadratures
+         self%rate(i) = self%data%recent(i, self%data%latest)
+      end do
       associate (first => self%system%n_controlled + 1)
          call integrate_quadratures(self, self%t_good, self%power, self%y_good(first:))
          call self%system%note_quadratures(self%y_good(first:), self%quadrature_error)
@@ -394,14 +403,16 @@ contains
    subroutine integrate_quadratures(self, t, power, values)
       class(erk_integrator), intent(inout) :: self
       real(wp), intent(in) :: t            !! [s]
-      real(wp), intent(in) :: power(:, :)  !! (n_states - n_controlled, stages)
-      real(wp), intent(inout) :: values(:) !! (n_states - n_controlled)
-      real(wp) :: integral(size(values)), tolerance
+      real(wp), intent(in) :: power(:, :)  !! (n_quadratures, stages)
+      real(wp), intent(inout) :: values(n_quadratures)
+      real(wp), dimension(n_quadratures) :: before, integral
+      real(wp) :: tolerance
       logical :: ok
 
-      associate (h => t - self%t_before, before => self%y_before(self%system%n_controlled + 1:), options => self%options)
-         integral = h*matmul(power, self%b)
-         self%quadrature_error(:) = h*estimate(self, power)
+      associate (h => t - self%t_before, options => self%options)
+         before = self%y_before(self%system%n_controlled + 1:)
+         integral = h*weighted(power, self%b)
+         self%quadrature_error = h*estimate(self, power)
          if (.not. options%fixed_step > 0.0_wp) then
             tolerance = self%system%quadrature_tolerance(options%rtol, before + integral)
             if (maxval(self%quadrature_error) > tolerance) &
@@ -416,17 +427,34 @@ contains
    !> points. Its distance to Weddle's rule, of two degrees less, is taken.
    pure function estimate(self, power) result(error)
       class(erk_integrator), intent(in) :: self
-      real(wp), intent(in) :: power(:, :) !! (n_states - n_controlled, stages)
-      real(wp) :: error(size(power, 1))
+      real(wp), intent(in) :: power(:, :) !! (n_quadratures, stages)
+      real(wp) :: error(n_quadratures)
       integer, parameter :: even(7) = [1, 8, 10, 6, 9, 7, 11] !! Fehlberg's stages at 0, 1/6, ... 1
       real(wp), parameter :: sixth_difference(7) = [1.0_wp, -6.0_wp, 15.0_wp, -20.0_wp, 15.0_wp, -6.0_wp, 1.0_wp]
+      integer :: j
 
       if (self%order < 7) then
-         error = abs(matmul(power, self%b - self%b_other))
+         error = abs(weighted(power, self%b_error))
       else
-         error = abs(matmul(power(:, even), sixth_difference))/840.0_wp
+         error = 0.0_wp
+         do j = 1, size(even)
+            error = error + sixth_difference(j)*power(:, even(j))
+         end do
+         error = abs(error)/840.0_wp
       end if
    end function estimate
+
+   !> Sums of rates with weights.
+   pure function weighted(power, weight) result(total)
+      real(wp), intent(in) :: power(:, :) !! (n_quadratures, stages)
+      real(wp), intent(in) :: weight(:)   !! (stages)
+      real(wp) :: total(n_quadratures)
+      integer :: j
+      total = 0.0_wp
+      do j = 1, size(weight)
+         total = total + weight(j)*power(:, j)
+      end do
+   end function weighted
 
    !> Rates at the start, for the first look into a step.
    subroutine begin_events(self, error)
@@ -519,7 +547,7 @@ contains
          if (abs(self%b(i)) > 0.0_wp) y(:) = y + (h*self%b(i))*self%rates(:, i)
       end do
       associate (first => self%system%n_controlled + 1)
-         if (size(self%rate) > 0) call integrate_quadratures(self, t_out, self%rates(first:, :), y(first:))
+         if (self%system%has_quadratures()) call integrate_quadratures(self, t_out, self%rates(first:, :), y(first:))
       end associate
       if (.not. all_finite(y)) call raise(error, 'output at t = '//time_text(t_out)//' s: the state is not finite')
    end subroutine output_step
