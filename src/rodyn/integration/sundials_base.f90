@@ -55,8 +55,8 @@ module rodyn_sundials_base
 
 contains
 
-   !> The user's tolerances times this are the library's: as much as makes steps shorter by a factor, their errors, the next power of
-   !> the step after the order's, by its power. Not below what rounding allows.
+   !> The user's tolerances times this are the library's: as much as makes its steps shorter by a factor. Not below what
+   !> rounding allows.
    pure real(wp) function stricter(shorter, power, rtol)
       real(wp), intent(in) :: shorter !! < 1
       integer, intent(in) :: power    !! of the step in the error that is tested
