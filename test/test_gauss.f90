@@ -14,12 +14,20 @@ module test_gauss
    use rodyn_integrator, only: solver_options
    use rodyn_gauss_integrator, only: gauss_integrator, new_gauss_integrator
    use test_testing, only: unittest, new_test, check, check_close
-   use test_random_scenes, only: random_case, seed_random, uniform, kind_name, n_kinds
+   use test_random_scenes, only: random_case, seed_random, uniform, kind_name, n_kinds, allocate_case
    use rodyn_case_reader, only: read_case
    use test_trajectories, only: trajectory, integrate
    implicit none (type, external)
    private
    public :: collect_gauss
+
+   !> A motion that cannot be evaluated in steps of some lengths.
+   type, extends(motion_type) :: fickle_motion
+      real(wp) :: refused(2) = 0.0_wp !! lengths of such steps [s]
+      integer :: n_refused = 0
+   contains
+      procedure :: lane_accelerations => refuse_some
+   end type fickle_motion
 
 contains
 
@@ -37,6 +45,9 @@ contains
          new_test('dampers of any strength cost no more than 7 iterations a step', test_dampers), &
          new_test('fixed steps bear strong dampers', test_fixed_with_dampers), &
          new_test('dampers alone hold a free hinge', test_free_hinge), &
+         new_test('damped slews give every state inside their long steps', test_damped_slews), &
+         new_test('what couples modes is judged for steps of each length', test_coupling_of_steps), &
+         new_test('a state inside a step is there even if no shorter step is', test_refused_inside), &
          new_test('a run does not depend on the one before', test_history), &
          new_test('relaxing joints are refused by name', test_refused)]
    end subroutine collect_gauss
@@ -249,7 +260,6 @@ contains
       call new_gauss_collocation(rule)
       call modes%reserve(n, n, 0, 2)
       modes%n = n
-      modes%coupled = .true.
       modes%weight = 0.7_wp
       modes%square = [900.0_wp, 30.0_wp, 5.0_wp]
       modes%grip = reshape([0.2_wp, 0.4_wp, -0.3_wp, -0.1_wp, 0.3_wp, 0.8_wp], [n, 2])
@@ -268,7 +278,7 @@ contains
       end do
       x = reshape(residuals, [m, 1])
       call dgesv(m, 1, matrix, m, pivots, x, m, info)
-      call modal%prepare(rule, modes, h)
+      call modal%prepare(rule, modes, h, .true.)
       call modal%answer(rule, modes, residuals, reply)
       call check(error, info == 0 .and. maxval(abs(reply + residuals - reshape(x, [lanes, n]))) < 1.0e-9_wp, 'coupled')
       if (allocated(error)) return
@@ -278,11 +288,10 @@ contains
       modes%grip_t = transpose(modes%grip)
       modes%damping = modes%square*sum(modes%grip**2, dim=2)
       modes%omega_2 = modes%square - modes%weight*modes%damping
-      call modal%prepare(rule, modes, h)
+      call modal%prepare(rule, modes, h, .true.)
       call modal%answer(rule, modes, residuals, reply)
       x = reshape(reply, [m, 1])
-      modes%coupled = .false.
-      call modal%prepare(rule, modes, h)
+      call modal%prepare(rule, modes, h, .false.)
       call modal%answer(rule, modes, residuals, reply)
       call check_close(error, reshape(reply, [m]), x(:, 1), 1.0e-10_wp, 'not coupled')
    end subroutine test_coupled
@@ -398,6 +407,144 @@ contains
       if (allocated(error)) return
       call check(error, motion%counts%n_steps < 100 .and. motion%counts%n_rhs < 7*lanes*motion%counts%n_steps, 'effort')
    end subroutine test_free_hinge
+
+   !> Long after the load these steps are of a second or more, in which dampers do not couple the modes, with up to ten outputs
+   !> inside, in shorter steps in which they do.
+   subroutine test_damped_slews(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+      type(trajectory) :: exact, motion
+      integer :: i, j
+      integer, parameter :: n_rods(3) = [3, 2, 3]
+      real(wp), parameter :: bending(3) = [1.0e3_wp, 3.0e2_wp, 3.0e2_wp], spring(3) = [308.5_wp, 111.0_wp, 79.42_wp], &
+         damper(3) = [3.598_wp, 1.797_wp, 3.192_wp], tolerance = 1.0e-8_wp, times(*) = [(0.2_wp*i, i=1, 175)]
+
+      do j = 1, 3
+         call slew(config, n_rods(j), bending(j), spring(j), damper(j))
+         config%solver%method = 'dop853'
+         config%solver%rtol = 1.0e-12_wp
+         config%solver%atol = 1.0e-14_wp
+         call integrate(config, times, exact, error)
+         if (allocated(error)) return
+         config%solver%method = 'gauss'
+         config%solver%rtol = tolerance
+         config%solver%atol = 0.01_wp*tolerance
+         call integrate(config, times, motion, error)
+         if (allocated(error)) return
+         do i = 1, size(times)
+            call check_close(error, motion%rows(i)%phi, exact%rows(i)%phi, 10.0_wp*tolerance, 'phi')
+            if (allocated(error)) return
+         end do
+         call check(error, motion%counts%last_step > 1.0_wp, 'the steps are short')
+         if (allocated(error)) return
+      end do
+   end subroutine test_damped_slews
+
+   !> A spacecraft with equal rods that a moment turns for a second.
+   subroutine slew(config, n, bending, spring, damper)
+      type(case_config), intent(out) :: config
+      integer, intent(in) :: n
+      real(wp), intent(in) :: bending, spring, damper !! EI, C, D
+      call allocate_case(config, n)
+      config%spacecraft%mass = 300.0_wp
+      config%spacecraft%inertia = 120.0_wp
+      config%spacecraft%hinge_x = 0.7_wp
+      config%chain%length = 2.0_wp
+      config%chain%mass_per_length = 0.8_wp
+      config%chain%bending_stiffness = bending
+      config%chain%hinge_stiffness = spring
+      config%chain%hinge_damping = damper
+      deallocate (config%loads)
+      allocate (config%loads(1))
+      config%loads%component = 'M'
+      config%loads%value = 10.0_wp
+      config%loads%t_end = 1.0_wp
+      config%output%ledger = .false.
+   end subroutine slew
+
+   !> Two modes with omega = 1 and 100 that one damper couples, by definition: the off-diagonal of h lambda D in units that make the
+   !> diagonal of 1 + (h lambda)^2 K one is largest for h lambda = 1/10, and falls off to both sides.
+   subroutine test_coupling_of_steps(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(stiff_modes) :: modes
+      real(wp) :: weight, off_diagonal
+      integer :: i
+
+      call modes%reserve(2, 2, 0, 1)
+      modes%n = 2
+      modes%square = [1.0_wp, 1.0e4_wp]
+      modes%grip(:, 1) = [0.2_wp, 0.2_wp]
+      modes%grip_t = transpose(modes%grip)
+      call modes%bound_coupling()
+      do i = -5, 9
+         weight = 10.0_wp**(0.5_wp*i)
+         off_diagonal = weight*0.04_wp*100.0_wp/sqrt((weight**2 + 1.0_wp)*(weight**2 + 1.0e4_wp))
+         call check(error, modes%couples(weight) .eqv. off_diagonal > 0.03_wp, 'coupled')
+         if (allocated(error)) return
+      end do
+      modes%grip_t = 0.8_wp*modes%grip_t ! now the largest is 0.025
+      call modes%bound_coupling()
+      call check(error, .not. modes%couples(10.0_wp), 'not coupled')
+   end subroutine test_coupling_of_steps
+
+   !> One step of 0.1 s, and a state at 0.06 s: by one shorter step, by two where that one is refused, by the polynomial of the
+   !> step, which is of lower order, where all are.
+   subroutine test_refused_inside(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+      type(scene_type) :: scene
+      type(fickle_motion), target :: motion
+      type(gauss_integrator) :: integrator
+      real(wp), parameter :: lengths(2, 3) = reshape([0.0_wp, 0.0_wp, 0.05_wp, 0.07_wp, 0.0_wp, 0.07_wp], [2, 3]), &
+         closeness(3) = [0.0_wp, 1.0e-9_wp, 1.0e-5_wp] ! the iteration leaves 0.05 rtol
+      integer, parameter :: n_refused(3) = [0, 1, 4]
+      real(wp), allocatable :: y(:), first(:)
+      real(wp) :: t
+      integer :: i
+
+      call slew(config, 3, 1.0e3_wp, 300.0_wp, 0.0_wp)
+      config%model%bending = 'rigid'
+      config%initial%phi = [0.2_wp, 0.4_wp, 0.5_wp]
+      call new_scene(scene, config, error)
+      if (allocated(error)) return
+      do i = 1, 3
+         call new_motion(motion%motion_type, scene, .true., error)
+         if (allocated(error)) return
+         motion%refused = lengths(:, i)
+         motion%n_refused = 0
+         call motion%dynamics%set_regime(0.0_wp, 1.0_wp)
+         call initial_state(motion%motion_type, config%initial, y)
+         call new_gauss_integrator(integrator, motion, solver_options(fixed_step=0.1_wp), error)
+         if (allocated(error)) return
+         call integrator%set_stop(0.1_wp)
+         call integrator%start(0.0_wp, y, error)
+         if (allocated(error)) return
+         call integrator%advance(0.06_wp, y, t, error)
+         if (allocated(error)) return
+         call integrator%finalize()
+         if (i == 1) first = y
+         call check_close(error, y, first, closeness(i), 'state inside the step')
+         if (allocated(error)) return
+         call check(error, abs(t - 0.06_wp) <= 0.0_wp .and. motion%n_refused == n_refused(i), 'refusals')
+         if (allocated(error)) return
+      end do
+   end subroutine test_refused_inside
+
+   subroutine refuse_some(self, t, q, p, acceleration, ok)
+      class(fickle_motion), intent(inout) :: self
+      real(wp), intent(in) :: t(lanes)
+      real(wp), contiguous, intent(in) :: q(:, :), p(:, :)
+      real(wp), contiguous, intent(out) :: acceleration(:, :)
+      logical, intent(out) :: ok
+      real(wp) :: length
+
+      call self%motion_type%lane_accelerations(t, q, p, acceleration, ok)
+      length = (t(lanes) - t(1))/0.96028986_wp ! between the outer nodes
+      if (length < self%refused(1) .or. length > self%refused(2)) return
+      if (all(abs(t - t(1)) <= 0.0_wp)) return ! the first guess of all
+      ok = .false.
+      self%n_refused = self%n_refused + 1
+   end subroutine refuse_some
 
    subroutine test_refused(error)
       type(error_type), allocatable, intent(out) :: error

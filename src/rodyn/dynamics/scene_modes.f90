@@ -22,7 +22,6 @@ module rodyn_scene_modes
    real(wp), parameter :: negligible = 1.0e-5_wp !! b_i.b_j, of the smaller square
    real(wp), parameter :: damped_negligible = 1.0e-9_wp !! likewise where dampers matter, whose squares may be large
    real(wp), parameter :: little = 0.2_wp !! of dampers beside springs: their weight is of no importance
-   real(wp), parameter :: much = 0.03_wp  !! coupling of modes by dampers that matters
 
    !> What stays constant of a scene, and memory.
    type :: modes_finder
@@ -179,7 +178,6 @@ contains
       end if
       call keep_fast_modes(self, scene%n_base, slowest, modes)
       call add_dampers(self, modes)
-      modes%coupled = weight > 0.0_wp .and. coupling(modes, weight) > much
    end subroutine find
 
    !> Whether modes for this weight of dampers are others than those of the weight that was factored.
@@ -229,26 +227,7 @@ contains
          modes%damping(i) = modes%square(i)*dot_product(modes%grip_t(:, i), modes%grip_t(:, i))
          modes%omega_2(i) = modes%square(i) - modes%weight*modes%damping(i)
       end do
+      call modes%bound_coupling()
    end subroutine add_dampers
-
-   !> How much dampers couple modes in a step whose h lambda has the size 1/weight: the largest norm of a row of h lambda D without
-   !> its diagonal, in units that make the diagonal of 1 + h^2 lambda^2 (K + w D) one. (What couples K is as large.)
-   pure real(wp) function coupling(modes, weight)
-      type(stiff_modes), intent(in) :: modes
-      real(wp), intent(in) :: weight !! [1/s]
-      real(wp) :: row
-      integer :: i, j
-      coupling = 0.0_wp
-      if (modes%n_dampers == 0) return
-      do i = 1, modes%n
-         row = 0.0_wp
-         do j = 1, modes%n
-            if (j /= i) row = row + modes%square(j)/(weight**2 + modes%square(j)) &
-                              *dot_product(modes%grip_t(:, i), modes%grip_t(:, j))**2
-         end do
-         coupling = max(coupling, row*modes%square(i)/(weight**2 + modes%square(i)))
-      end do
-      coupling = weight*sqrt(coupling)
-   end function coupling
 
 end module rodyn_scene_modes

@@ -40,6 +40,7 @@ module rodyn_gauss_integrator
    integer, parameter :: degrees(*) = [2, s - 1]   !! of the first guess
    integer, parameter :: degree_interval = 16      !! steps after which the degree is judged again
    real(wp), parameter :: search_cost = 1.0_wp      !! finding modes, in iterations per unknown
+   integer, parameter :: most_inner_steps = 8       !! to an output
 
    ! The numbers of the method, made once: a sweep has thousands of integrators.
    type(gauss_collocation) :: made_rule
@@ -50,6 +51,7 @@ module rodyn_gauss_integrator
       real(wp) :: h = 0.0_wp                 !! step [s]
       real(wp) :: h_a(s, s) = 0.0_wp         !! h A
       real(wp) :: h2_a2(s, s) = 0.0_wp       !! h^2 A^2
+      logical :: coupled = .false.           !! dampers couple the modes in such steps
       type(modal_reply) :: modal             !! (1 + h A D + h^2 A^2 K)^-1 - 1 in modes
       real(wp) :: h_last = 0.0_wp            !! step that `ahead` extrapolates from [s]
       real(wp) :: ahead(s, s) = 0.0_wp       !! node values of that step to those of this one
@@ -195,7 +197,6 @@ contains
       real(wp), contiguous, intent(out) :: y(:) !! (n_states)
       real(wp), intent(out) :: t    !! t_out, or the last good time [s]
       type(error_type), allocatable, intent(out) :: error
-      logical :: ok
 
       call self%check_target(t_out, error)
       do while (.not. allocated(error) .and. self%t < t_out)
@@ -204,35 +205,61 @@ contains
       t = self%t
       y = self%y
       if (allocated(error) .or. t <= t_out) return
-      call inner_state(self, t_out, y, ok)
-      if (.not. ok) then
-         call raise(error, 'gauss: output at t = '//time_text(t_out)//' s: '//trouble(self))
-         return
-      end if
+      call inner_state(self, t_out, y)
       t = t_out
    end subroutine advance
 
-   !> State inside the last step, by one shorter step from its start whose first guess is that step's own polynomial.
-   subroutine inner_state(self, t_out, y, ok)
+   !> State inside the last step, by one shorter step from its start whose first guess is that step's own polynomial. Should its
+   !> iteration not converge, by several steps; and if nothing helps, by the polynomial itself, which is of lower order.
+   subroutine inner_state(self, t_out, y)
       class(gauss_integrator), intent(inout) :: self
       real(wp), intent(in) :: t_out
       real(wp), contiguous, intent(out) :: y(:)
-      logical, intent(out) :: ok
-      real(wp) :: h, rate
+      integer :: n
+      logical :: ok
 
-      h = t_out - self%t_before
       call swap_matrices(self%now, self%spare)
-      call set_step(self, h)
-      call set_weights(self, self%y_before)
-      call multiply(self%mechanics%n_dof, self%rule%interpolation(0.0_wp, h/self%last%h), self%last%f, self%trial%f)
-      rate = self%rate
-      call iterate(self, self%t_before, self%y_before, ok)
-      self%rate = rate
-      call form_increment(self, self%y_before)
-      if (self%system%has_quadratures()) call add_quadratures(self, self%t_before, self%y_before)
-      y = self%y_before + self%increment
+      n = 1
+      do
+         call inner_steps(self, t_out - self%t_before, n, y, ok)
+         if (ok .or. n >= most_inner_steps) exit
+         n = 2*n
+      end do
+      if (.not. ok) call inner_steps(self, t_out - self%t_before, 1, y)
       call swap_matrices(self%now, self%spare)
    end subroutine inner_state
+
+   !> From the start of the last step over a time h in n equal steps; without `ok` their first guess is left as it is.
+   subroutine inner_steps(self, h, n, y, ok)
+      class(gauss_integrator), intent(inout) :: self
+      real(wp), intent(in) :: h !! [s]
+      integer, intent(in) :: n
+      real(wp), contiguous, intent(out) :: y(:)
+      logical, intent(out), optional :: ok
+      real(wp) :: rate, t
+      integer :: i
+
+      y = self%y_before
+      rate = self%rate
+      call set_step(self, h/n)
+      do i = 0, n - 1
+         t = self%t_before + h*(real(i, wp)/n)
+         call multiply(self%mechanics%n_dof, self%rule%interpolation((h*i)/(n*self%last%h), h/(n*self%last%h)), self%last%f, &
+                       self%trial%f)
+         if (present(ok)) then
+            call set_weights(self, y)
+            call iterate(self, t, y, ok)
+            if (ok) ok = all(ieee_is_finite(self%trial%f))
+            if (.not. ok) exit
+         else
+            call nodes_from(self, y)
+         end if
+         call form_increment(self, y)
+         if (self%system%has_quadratures()) call add_quadratures(self, t, y)
+         y = y + self%increment
+      end do
+      self%rate = rate
+   end subroutine inner_steps
 
    subroutine swap_matrices(a, b)
       type(step_matrices), allocatable, intent(inout) :: a, b
@@ -262,6 +289,10 @@ contains
             return
          end if
          call set_step(self, h)
+         if (self%now%coupled .neqv. self%modes%coupled) then
+            self%modes%coupled = self%now%coupled
+            call renew_history(self)
+         end if
          call predict(self, ok)
          if (ok) call iterate(self, self%t, self%y, ok)
          estimate = huge(1.0_wp)
@@ -269,12 +300,11 @@ contains
             call form_increment(self, self%y, estimate)
             ok = all(ieee_is_finite(self%increment))
          end if
-         if (self%n_grid > 0) then
-            if (ok) exit
+         if (ok .and. (estimate <= largest_estimate .or. self%n_grid > 0)) exit
+         if (self%n_grid > 0 .and. rejected) then ! not even with new modes
             call raise(error, 'gauss at t = '//time_text(self%t)//' s: '//trouble(self))
             return
          end if
-         if (ok .and. estimate <= largest_estimate) exit
          self%counts%n_error_test_failures = self%counts%n_error_test_failures + 1
          self%n_steps = self%n_steps - 1
          rejected = .true.
@@ -283,7 +313,7 @@ contains
          else
             self%counts%n_nonlinear_failures = self%counts%n_nonlinear_failures + 1
             self%excess = huge(1.0_wp) ! the modes may be to blame
-            self%h = 0.4_wp*h
+            if (self%n_grid == 0) self%h = 0.4_wp*h
          end if
       end do
       if (modulo(self%n_steps, degree_interval) == 0) call choose_degree(self)
@@ -369,12 +399,19 @@ contains
          if (.not. allocated(self%modal)) &
             allocate (self%modal(s, most), self%reply(s, most), self%stiff(s, most), self%rest(most), self%motion(most))
       end associate
-      if (self%i_grid == 0) self%has_history = .false. ! no step has been accepted that could be restored
-      if (self%has_history) then
-         call restore_nodes(self, self%last)
-         call remove_stiff_part(self, self%last)
-      end if
+      if (h > 0.0_wp) self%modes%coupled = self%modes%couples(1.0_wp/(typical_lambda*h))
+      call renew_history(self)
    end subroutine search_modes
+
+   !> What is smooth of the last step, with other modes.
+   subroutine renew_history(self)
+      class(gauss_integrator), intent(inout) :: self
+
+      if (self%i_grid == 0) self%has_history = .false. ! no step has been accepted that could be restored
+      if (.not. self%has_history) return
+      call restore_nodes(self, self%last)
+      call remove_stiff_part(self, self%last)
+   end subroutine renew_history
 
    !> Matrices for a step of length h.
    subroutine set_step(self, h)
@@ -386,7 +423,8 @@ contains
       self%now%h_last = 0.0_wp
       self%now%h_a = h*self%rule%a
       self%now%h2_a2 = h**2*self%rule%a2
-      call self%now%modal%prepare(self%rule, self%modes, h)
+      self%now%coupled = self%modes%couples(1.0_wp/(typical_lambda*h))
+      call self%now%modal%prepare(self%rule, self%modes, h, self%now%coupled)
    end subroutine set_step
 
    subroutine set_weights(self, y)
@@ -517,7 +555,7 @@ contains
          self%iterations = j
          call self%mechanics%lane_accelerations(times, self%trial%q, self%trial%p, self%trial%a, ok)
          self%counts%n_rhs = self%counts%n_rhs + s
-         if (self%modes%coupled) self%counts%n_coupled = self%counts%n_coupled + s
+         if (self%now%coupled) self%counts%n_coupled = self%counts%n_coupled + s
          self%refused = .not. ok
          if (.not. ok) return
          call residual(m, self%trial%a, self%trial%f, self%guess, self%trial%smooth)

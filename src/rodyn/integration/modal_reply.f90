@@ -22,7 +22,7 @@ module rodyn_modal_reply
    type :: modal_reply
       private
       integer :: n = 0                           !! modes
-      logical :: coupled = .false.
+      logical :: coupled = .false.               !! are they taken to be?
       real(wp), allocatable :: matrices(:, :, :) !! of each mode, not coupled (s, s, most)
       real(wp), allocatable :: inverse(:, :)     !! d^-1 (s, most)
       real(wp), allocatable :: factor(:, :)      !! a square d^-1 (s, most)
@@ -36,16 +36,17 @@ module rodyn_modal_reply
 
 contains
 
-   !> For steps of length h.
-   subroutine prepare(self, rule, modes, h)
+   !> For steps of length h, of modes that are coupled or not.
+   subroutine prepare(self, rule, modes, h, coupled)
       class(modal_reply), intent(inout) :: self
       type(gauss_collocation), intent(in) :: rule
       type(stiff_modes), intent(in) :: modes
       real(wp), intent(in) :: h !! [s]
+      logical, intent(in) :: coupled
       integer :: i
 
       self%n = modes%n
-      self%coupled = modes%coupled
+      self%coupled = coupled
       call reserve(self, size(modes%square), modes%n_dampers)
       if (self%coupled) then
          call couple(self, rule, modes, h)

@@ -7,15 +7,19 @@ module rodyn_stiff_modes
    private
    public :: stiff_modes
 
+   real(wp), parameter :: much = 0.03_wp !! coupling of modes by dampers that matters
+
    !> The stiff part of M(q) p' = ... - K q - D p near a configuration, in modes that are orthogonal for K + w D:
    !>     M^-1 (K + w D) ~ sum square_i u_i v_i^T,   v_i^T u_j = delta_ij,
    !>     M^-1 D ~ sum square_i (grip_i . grip_j) u_i v_j^T.
    !> `grip_i` is how mode i moves the dampers, D = G G^T, grip_i = G^T u_i. If dampers are weak, or much stronger than the
-   !> springs, the modes are nearly orthogonal for both. Else they are `coupled`: the products of different modes matter, too.
+   !> springs, the modes are nearly orthogonal for both. Else they are `coupled`: the products of different modes matter, too. How
+   !> much dampers matter beside springs depends on the length of a step, and so does that.
    type :: stiff_modes
       integer :: n = 0                       !! modes; their number changes, so the arrays have room for `most`
       integer :: n_dampers = 0
-      logical :: coupled = .false.
+      logical :: coupled = .false.           !! in the steps in hand, see `coupling`
+      logical :: may_couple = .false.        !! in steps of some length
       real(wp) :: weight = 0.0_wp            !! w [1/s]
       real(wp), allocatable :: square(:)     !! (most) [1/s^2]
       real(wp), allocatable :: omega_2(:)    !! square_i - w damping_i: by springs alone (most) [rad^2/s^2]
@@ -30,6 +34,8 @@ module rodyn_stiff_modes
       procedure :: fastest
       procedure :: stiff_rates
       procedure :: stiff_line
+      procedure :: bound_coupling
+      procedure :: couples
    end type stiff_modes
 
 contains
@@ -115,6 +121,52 @@ contains
          end do
       end associate
    end subroutine stiff_line
+
+   !> Whether dampers couple the modes in steps whose h lambda has the size 1/weight: the largest norm of a row of h lambda D
+   !> without its diagonal, in units that make the diagonal of 1 + h^2 lambda^2 (K + w D) one. (What couples K is as large.)
+   pure logical function couples(self, weight)
+      class(stiff_modes), intent(in) :: self
+      real(wp), intent(in) :: weight !! [1/s]
+      real(wp) :: row
+      integer :: i, j
+
+      couples = .false.
+      if (.not. self%may_couple) return
+      do i = 1, self%n
+         row = 0.0_wp
+         do j = 1, self%n
+            if (j /= i) row = row + self%square(j)/(weight**2 + self%square(j))*contact(self, i, j)
+         end do
+         couples = weight**2*self%square(i)/(weight**2 + self%square(i))*row > much**2
+         if (couples) return
+      end do
+   end function couples
+
+   !> Whether they do in steps of any length: each term of a row is largest where weight^2 = omega_i omega_j.
+   pure subroutine bound_coupling(self)
+      class(stiff_modes), intent(inout) :: self
+      real(wp) :: omega(self%n), row
+      integer :: i, j
+
+      self%may_couple = .false.
+      if (self%n_dampers == 0) return
+      omega = sqrt(self%square(:self%n))
+      do i = 1, self%n
+         row = 0.0_wp
+         do j = 1, self%n
+            if (j /= i) row = row + (omega(i)*omega(j)/(omega(i) + omega(j)))**2*contact(self, i, j)
+         end do
+         self%may_couple = row > much**2
+         if (self%may_couple) return
+      end do
+   end subroutine bound_coupling
+
+   !> Square of how two modes move the dampers together [s^2].
+   pure real(wp) function contact(self, i, j)
+      type(stiff_modes), intent(in) :: self
+      integer, intent(in) :: i, j
+      contact = dot_product(self%grip_t(:, i), self%grip_t(:, j))**2
+   end function contact
 
    !> What all modes together, each by its `work`, do to the dampers.
    subroutine grip_all(self)
