@@ -22,9 +22,6 @@ from ordinary_scenes import FAMILIES, groups_of, text_of  # noqa: E402
 
 STORED = json.loads((pathlib.Path(__file__).parent / "ordinary_motions.json").read_text())
 RTOL, ATOL = 1e-8, 1e-10  # the defaults
-#: What is wrong and not mended. `gauss` takes a step after t = 2.5 s whose error is a hundred times its estimate: phi is off by
-#: 7.6e-6 rad, 16 times what it may be (docs/stability.md).
-KNOWN = {("profiles", 7)}
 
 
 def run(scene, place):
@@ -61,6 +58,5 @@ def fault(scene, place):
 def test_ordinary_scenes_move_as_free_bodies_with_multipliers_do(family, tmp_path):
     scenes = [scene for scene in STORED if scene["family"] == family]
     assert len(scenes) == 12
-    scenes = [scene for scene in scenes if (family, scene["seed"]) not in KNOWN]
     faults = {scene["seed"]: fault(scene, tmp_path) for scene in scenes}
     assert not any(faults.values()), "\n".join(f"{family} {seed}: {text}" for seed, text in faults.items() if text)
