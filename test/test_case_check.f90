@@ -5,7 +5,7 @@ module test_case_check
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type, raise, exit_bad_input
    use rodyn_case_config, only: case_config, hinge_config, kink_config, load_config, profile_config
-   use rodyn_case_reader, only: parse_case
+   use rodyn_case_reader, only: parse_case, resolved_case
    use rodyn_case_values, only: plain_text
    use rodyn_motion, only: motion_type, new_motion, initial_state
    use rodyn_scene, only: scene_type, new_scene
@@ -16,7 +16,7 @@ module test_case_check
    private
    public :: collect_case_check
 
-   integer, parameter :: n_faults = 56
+   integer, parameter :: n_faults = 62
 
 contains
 
@@ -309,6 +309,36 @@ contains
          text = '&solver fixed_step = 1e-12, method = ''erk'' /'
          config%solver%method = 'erk'
          config%solver%fixed_step = 1.0e-12_wp
+      case (57) ! what follows from a fault is none of its own
+         text = '&case t_end = -1 / &load value = 1 /'
+         config%t_end = -1.0_wp
+         call add_load()
+      case (58)
+         text = "&case t_end = -1 / &load law = 'smooth_step', value = 1 /"
+         config%t_end = -1.0_wp
+         call add_load()
+         config%loads(1)%law = 'smooth_step'
+      case (59)
+         text = '&case t_end = -1 / &kink_program hinge = 0, value = 1 /'
+         config%t_end = -1.0_wp
+         call add_program()
+      case (60)
+         text = '&case t_end = -1 / &kink_program hinge = 0, value = 1, t_start = 2 /'
+         config%t_end = -1.0_wp
+         call add_program()
+         config%kink_programs(1)%t_start = 2.0_wp
+      case (61)
+         text = "&case t_end = 0.5 / &load value = 1, t_start = 2 / &load value = 1, t_start = 0, law = 'smooth_step' /"
+         config%t_end = 0.5_wp
+         call add_load()
+         config%loads = [config%loads, config%loads]
+         config%loads(1)%t_start = 2.0_wp
+         config%loads(2)%law = 'smooth_step'
+      case (62)
+         text = "&case t_end = -1 / &solver method = 'erk', fixed_step = 1e-12 /"
+         config%t_end = -1.0_wp
+         config%solver%method = 'erk'
+         config%solver%fixed_step = 1.0e-12_wp
       case default ! there is no other
       end select
 
@@ -454,7 +484,7 @@ contains
    !> Nothing but what a file must give; hinges counted from 1 by an array constructor.
    subroutine test_defaults(error)
       type(error_type), allocatable, intent(out) :: error
-      type(case_config) :: config, given
+      type(case_config) :: config, given, resolved
       type(scene_type) :: scene, expected
       type(motion_type) :: motion
       real(wp), allocatable :: y(:)
@@ -469,7 +499,7 @@ contains
       allocate (config%loads(1))
       config%loads(1)%law = 'smooth_step'
       config%loads(1)%value = 1.0_wp
-      call new_scene(scene, config, error)
+      call new_scene(scene, config, error, resolved)
       if (allocated(error)) return
       call parse_case('&spacecraft mass = 100, inertia = 10 / &chain n_rods = 2, length = 1.5, 1, mass_per_length = 1,'// &
                       "bending_stiffness = 1e4, hinge_stiffness = 1, 2 / &load law = 'smooth_step', value = 1 /", 'c.nml', given, &
@@ -479,6 +509,7 @@ contains
       call check_close(error, [scene%node_mass, scene%hinges%stiffness, scene%hinges%damping, scene%loads%loads%rise], &
                        [expected%node_mass, expected%hinges%stiffness, expected%hinges%damping, expected%loads%loads%rise], &
                        0.0_wp, 'scene')
+      if (.not. allocated(error)) call check(error, resolved_case(resolved), resolved_case(given), 'values used')
       if (allocated(error)) return
       call new_motion(motion, scene, .false., error)
       if (allocated(error)) return

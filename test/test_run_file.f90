@@ -29,6 +29,7 @@ contains
          new_test('a failed run tells its message and last time', test_failed_run), &
          new_test('the final name appears only at the end', test_temporary_name), &
          new_test('a discarded run leaves nothing', test_discard), &
+         new_test('rows of a stopped run never need the name of another file', test_stopped), &
          new_test('an existing result is refused before computing', test_refused), &
          new_test('an existing result is replaced when forced', test_forced), &
          new_test('a result that appears meanwhile is left alone', test_race), &
@@ -307,6 +308,66 @@ contains
       if (allocated(error)) return
       call check(error, .not. path_exists(run%temporary_path), 'the temporary file is left')
    end subroutine test_discard
+
+   !> Shorter rows of the same case are replaced; longer ones, and whatever else has the name, stay.
+   subroutine test_stopped(error)
+      type(error_type), allocatable, intent(out) :: error
+      character(len=:), allocatable :: path
+      logical :: earlier
+
+      path = scratch_path('stopped.h5')
+      work: block
+         call stop_after(3, '', .false., path)
+         if (allocated(error)) exit work
+         call stop_after(2, '', .true., path)
+         if (allocated(error)) exit work
+         call stop_after(4, '', .false., path)
+         if (allocated(error)) exit work
+         call stop_after(2, 'another', .false., path//'-1')
+         if (allocated(error)) exit work
+         call stop_after(3, 'another', .false., path//'-1')
+         if (allocated(error)) exit work
+         call stop_after(2, 'a third', .false., path//'-2')
+      end block work
+      call clean(path)
+      call clean(path//'-1')
+      call clean(path//'-2')
+
+   contains
+
+      !> A run of some rows that stops.
+      subroutine stop_after(n_rows, input, is_earlier, name)
+         integer, intent(in) :: n_rows
+         character(len=*), intent(in) :: input
+         logical, intent(in) :: is_earlier     !! a longer one is there
+         character(len=*), intent(in) :: name  !! of the file that has the rows
+         type(run_file) :: run
+         type(run_row) :: row
+         type(run_header) :: header
+         integer :: i
+
+         header = sample_header(2, 1000, .true.)
+         header%resolved_input = input
+         call run%create(scratch_path('running.h5'), header, .false., error)
+         if (allocated(error)) return
+         row = new_run_row(2)
+         do i = 1, n_rows
+            row%time = i
+            call run%append(row, error)
+            if (allocated(error)) return
+         end do
+         call run%stop_at(path, .true., earlier)
+         call check(error, earlier .eqv. is_earlier, 'which is longer')
+         if (.not. allocated(error)) call check(error, run%path, name, 'name')
+         if (allocated(error)) return
+         if (earlier) then
+            call run%discard()
+         else
+            call run%finish('stopped', sample_report(), error, message='stopped')
+         end if
+      end subroutine stop_after
+
+   end subroutine test_stopped
 
    subroutine test_refused(error)
       type(error_type), allocatable, intent(out) :: error

@@ -3,7 +3,8 @@
 !> arrays that are not allocated, and whatever still has the initial value of its type.
 module rodyn_case_check
    use rodyn_kinds, only: wp
-   use rodyn_case_config, only: case_config, hinge_config, kink_config, load_config, profile_config, name_length, none_given
+   use rodyn_case_config, only: case_config, hinge_config, kink_config, load_config, model_config, profile_config, name_length, &
+      none_given
    use rodyn_case_fields, only: visit_case, law_takes, kink_law_takes
    use rodyn_case_rules, only: check_case
    use rodyn_case_schema, only: case_extents, case_rows
@@ -27,7 +28,8 @@ module rodyn_case_check
 
    !> Faults of a case.
    type, extends(key_judge) :: case_judge
-      type(case_config), pointer :: config => null()
+      type(case_config), pointer :: given => null()  !! says what was given
+      type(case_config), pointer :: config => null() !! with what was left out
       type(fault_list) :: faults
       type(unsound_key), allocatable :: unsound(:) !! not allocated: none
    contains
@@ -54,11 +56,17 @@ module rodyn_case_check
       procedure :: text_field
    end type value_checker
 
+   ! What a caller leaves as it is was not given
+   type(profile_config) :: blank_profile
+   type(model_config) :: blank_model
+   type(load_config) :: blank_load
+   type(hinge_config) :: blank_hinge
+
 contains
 
    !> A copy of a case with everything that was left out; an error, exit code 2, that tells all its faults.
    subroutine sound_case(given, config, error)
-      type(case_config), intent(in) :: given
+      type(case_config), target, intent(in) :: given
       type(case_config), target, intent(out) :: config
       type(error_type), allocatable, intent(out) :: error
       type(case_judge), target :: judge
@@ -70,25 +78,28 @@ contains
       if (.not. allocated(config%loads)) allocate (config%loads(0))
       if (.not. allocated(config%kink_programs)) allocate (config%kink_programs(0))
       if (.not. allocated(config%hinges)) allocate (config%hinges(0))
-      call complete_case(config)
+      judge%given => given
       judge%config => config
       checker%judge => judge
       n = config%chain%n_rods
       if (.not. satisfies(case_rows(row_index(case_rows, 'chain', 'n_rods')), real(n, wp))) n = 0
       checker%extents = case_extents(n)
       call visit_case(checker, config)
+      call complete_case(judge, config)
       call check_case(judge, config)
       call judge%faults%to_error('', error)
    end subroutine sound_case
 
-   !> Defaults that come from other keys. A table of a kink has its own times.
-   subroutine complete_case(config)
+   !> Defaults that come from other keys, as far as these are sound. A table of a kink has its own times.
+   subroutine complete_case(judge, config)
+      class(key_judge), intent(in) :: judge
       type(case_config), intent(inout) :: config !! lists allocated
       integer :: i
 
       do i = 1, size(config%profiles)
-         if (config%profiles(i)%last_rod == huge(1)) config%profiles(i)%last_rod = config%chain%n_rods
+         if (config%profiles(i)%last_rod == blank_profile%last_rod) config%profiles(i)%last_rod = config%chain%n_rods
       end do
+      if (.not. judge%is_sound('case', 1, 't_end')) return
       do i = 1, size(config%loads)
          associate (load => config%loads(i))
             if (is_none(load%t_end)) load%t_end = config%t_end
@@ -121,16 +132,19 @@ contains
       integer, intent(in) :: instance
 
       given = .true.
-      associate (c => self%config)
+      associate (c => self%given)
          select case (group)
          case ('spacecraft')
             if (key == 'mass') given = .not. is_unset(c%spacecraft%mass)
             if (key == 'inertia') given = .not. is_unset(c%spacecraft%inertia)
          case ('chain')
             if (key == 'mass_per_length') given = has_values(c%chain%mass_per_length)
-            if (key == 'bending_stiffness') given = has_values(c%chain%bending_stiffness)
+            if (key == 'bending_stiffness') then
+               given = has_values(c%chain%bending_stiffness)
+               if (given) given = .not. all(is_unset(c%chain%bending_stiffness))
+            end if
          case ('model')
-            if (key == 'bending') given = c%model%bending /= 'dynamic'
+            if (key == 'bending') given = c%model%bending /= blank_model%bending
          case ('rod_profile')
             given = profile_gives(c%profiles(instance), key)
          case ('load')
@@ -154,6 +168,8 @@ contains
       type(profile_config), intent(in) :: profile
       character(len=*), intent(in) :: key
       select case (key)
+      case ('last_rod')
+         given = profile%last_rod /= blank_profile%last_rod
       case ('polynomial')
          given = has_values(profile%polynomial)
       case ('positions')
@@ -171,9 +187,11 @@ contains
       character(len=*), intent(in) :: key
       select case (key)
       case ('node')
-         given = load%node /= 0
+         given = load%node /= blank_load%node
       case ('t_start')
          given = .not. is_unset(load%t_start)
+      case ('t_end')
+         given = .not. is_none(load%t_end)
       case ('value')
          given = law_takes(load%law, key) .or. .not. is_unset(load%value)
       case ('rate')
@@ -185,9 +203,9 @@ contains
       case ('values')
          given = has_values(load%values)
       case ('component')
-         given = load%component /= 'M'
+         given = load%component /= blank_load%component
       case ('after')
-         given = load%after /= 'zero'
+         given = load%after /= blank_load%after
       case default
          given = .true.
       end select
@@ -221,7 +239,7 @@ contains
       case ('release_time')
          given = .not. is_none(hinge%release_time)
       case ('release_after')
-         given = hinge%release_after /= -1
+         given = hinge%release_after /= blank_hinge%release_after
       case ('stop_stiffness')
          given = .not. is_unset(hinge%stop_stiffness)
       case ('friction_velocity')
@@ -345,14 +363,10 @@ contains
       class(value_checker), intent(inout) :: self
       character(len=*), intent(in) :: key
       integer, intent(inout) :: x
-      integer :: none
 
       call find(self, key)
       if (satisfies(case_rows(self%row), real(x, wp))) return
-      none = huge(1) ! initial values of the types
-      if (key == 'node') none = 0
-      if (key == 'release_after') none = -1
-      if (case_rows(self%row)%default == 'depends' .and. x == none) return
+      if (case_rows(self%row)%default == 'depends' .and. .not. self%judge%is_given(self%group, self%instance, key)) return
       call reject(self, '', ' = '//to_text(x), rule_text(case_rows(self%row)))
    end subroutine integer_field
 

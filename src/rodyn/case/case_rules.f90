@@ -259,6 +259,8 @@ contains
       if (.not. config%solver%fixed_step > 0.0_wp) return
       if (.not. any(config%solver%method == ['erk   ', 'dop853', 'gauss '])) then
          call judge%blame('solver', 1, 'fixed_step', "is possible with method = 'erk', 'dop853' or 'gauss' only")
+      else if (.not. (judge%is_sound('case', 1, 't_end') .and. judge%is_sound('solver', 1, 'max_steps'))) then
+         return
       else if (config%t_end/config%solver%max_steps > config%solver%fixed_step) then
          call judge%blame('solver', 1, 'fixed_step', 'would make more than max_steps = '// &
                     to_text(config%solver%max_steps)//' steps until t_end = '//short_text(config%t_end)//' [s]')

@@ -3,7 +3,9 @@ module rodyn_case_values
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: case_config, name_length
    use rodyn_case_fields, only: visit_case
+   use rodyn_case_schema, only: case_rows
    use rodyn_field_visitor, only: field_visitor
+   use rodyn_schema, only: any_list, row_index
    use rodyn_text, only: printable, quoted, to_text
    implicit none (type, external)
    private
@@ -141,7 +143,7 @@ contains
       character(len=*), intent(in) :: key
       real(wp), allocatable, intent(inout) :: x(:)
       if (.not. found(self, key) .or. .not. allocated(x)) return
-      self%text = list_text(x, key == 'times' .or. key == 'values' .or. key == 'positions' .or. key == 'polynomial')
+      self%text = list_text(x, case_rows(row_index(case_rows, self%group, key))%extent == any_list)
    end subroutine array_field
 
    subroutine integer_field(self, key, x)

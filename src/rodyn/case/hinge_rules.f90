@@ -61,6 +61,7 @@ contains
          return
       end if
       if (.not. (judge%is_sound('kink_program', i, 't_start') .and. judge%is_sound('kink_program', i, 't_end'))) return
+      if (.not. judge%is_given('kink_program', i, 't_end') .and. .not. judge%is_sound('case', 1, 't_end')) return
       if (program%t_start > program%t_end .and. .not. same_time(program%t_start, program%t_end)) then
          call judge%blame('kink_program', i, 't_start', 'must not be after t_end')
       else if (same_time(program%t_start, program%t_end) .and. program%law /= 'ramp') then

@@ -4,7 +4,7 @@ module rodyn_key_judge
    use rodyn_text, only: to_text
    implicit none (type, external)
    private
-   public :: key_judge, require, no_such
+   public :: key_judge, no_such
 
    type, abstract :: key_judge
    contains

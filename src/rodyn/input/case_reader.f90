@@ -84,7 +84,7 @@ contains
       allocate (config%profiles(instances(checked, 'rod_profile')), config%loads(instances(checked, 'load')), &
                 config%kink_programs(instances(checked, 'kink_program')), config%hinges(instances(checked, 'hinge')))
       call visit_case(loader, config)
-      call complete_case(config)
+      call complete_case(checked, config)
       call check_case(checked, config)
       call checked%faults%to_error(document%name, error)
    end subroutine case_from_document

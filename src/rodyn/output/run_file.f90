@@ -15,15 +15,14 @@ module rodyn_run_file
    use rodyn_errors, only: error_type, raise
    use rodyn_hdf5_files, only: hdf5_file
    use rodyn_kinds, only: i8, wp
-   use rodyn_posix, only: path_exists
-   use rodyn_posix_files, only: rename_aside
+   use rodyn_posix, only: path_exists, remove_file
    use rodyn_result_file, only: check_output_path, provenance, result_file, text_or_empty
    use rodyn_run_layout, only: i_alpha, i_alpha_rate, i_angular_momentum, i_beta, i_beta_rate, i_bubble, i_bubble_rate, &
       i_displacement_x, i_displacement_y, i_energy_dissipated, i_energy_elastic, i_energy_kinetic, i_energy_residual, &
       i_momentum_x, &
       i_momentum_y, i_omega, i_phi, i_phi_rate, i_rotation, i_time, i_velocity_x, i_velocity_y, i_work_external, &
       n_run_variables, run_coordinates, run_variables, solver_group, events_group
-   use rodyn_text, only: short_text
+   use rodyn_text, only: short_text, to_text
    implicit none (type, external)
    private
    public :: run_file, run_header, run_row, solver_report, new_run_row, is_finite, check_output_path
@@ -166,32 +165,33 @@ contains
       is_finite = is_finite .and. all(abs(row%bubble) <= most) .and. all(abs(row%bubble_rate) <= most)
    end function is_finite
 
-   !> The rows of a stopped run get a name of their own, so that the same call can be made again. If there are some of that
-   !> name already, of the same case, the more stay: `earlier` is true, the longer file is left alone and this one removed.
-   !> Rows of another case are set aside as PATH-1, PATH-2, ...
-   subroutine stop_at(self, path, alike, earlier, error)
+   !> The rows of a stopped run get a name of their own, so that the same call can be made again: PATH, or PATH-1, PATH-2, ...
+   !> behind what is not theirs to replace. Where there are some of the same case already, the more stay: `earlier` is true if
+   !> those do, and then this file is not needed.
+   subroutine stop_at(self, path, alike, earlier)
       class(run_file), intent(inout) :: self
       character(len=*), intent(in) :: path
-      logical, intent(in) :: alike                          !! runs of equal input are equal
+      logical, intent(in) :: alike !! runs of equal input are equal
       logical, intent(out) :: earlier
-      type(error_type), allocatable, intent(out) :: error
-      character(len=:), allocatable :: name, failure
+      type(error_type), allocatable :: unwritten !! `finish` tells of it
       logical :: same
-      real(wp) :: t_earlier, t_reached
+      real(wp) :: t_earlier
+      integer :: i
 
-      self%path = path
-      self%force = .true.
+      call self%write_waiting_rows(unwritten)
+      self%force = .false.
       earlier = .false.
-      if (.not. path_exists(path)) return
-      call compare(path, self%resolved_input, same, t_earlier)
-      if (same .and. alike) then
-         t_reached = self%last_time
-         if (self%waiting > 0) t_reached = self%columns(i_time)%scalars(self%waiting)
-         earlier = t_earlier >= t_reached
-      else
-         call rename_aside(path, path, '', name, failure)
-         if (len(failure) > 0) call raise(error, path//': cannot be set aside: '//failure)
-      end if
+      do i = 0, huge(i) - 1
+         self%path = path
+         if (i > 0) self%path = path//'-'//to_text(i)
+         if (.not. path_exists(self%path)) return
+         if (.not. alike) cycle
+         call compare(self%path, self%resolved_input, same, t_earlier)
+         if (.not. same) cycle
+         earlier = t_earlier >= self%last_time
+         if (earlier) return
+         if (len(remove_file(self%path)) == 0) return ! its rows are among these, which are in a file
+      end do
    end subroutine stop_at
 
    !> Is a file one of rows of this program and this input, and how far do they go?
@@ -201,18 +201,16 @@ contains
       real(wp), intent(out) :: t_reached !! [s]
       type(hdf5_file) :: file
       type(error_type), allocatable :: error
-      character(len=:), allocatable :: text
+      character(len=:), allocatable :: input, commit
 
       t_reached = 0.0_wp
       same = .false.
       call file%open(path, error)
-      if (.not. allocated(error)) call file%get_attribute('/', 'resolved_input', text, error)
       if (allocated(error)) return
-      same = text == resolved_input
-      call file%get_attribute('/', 'git_commit', text, error)
-      if (.not. allocated(error)) same = same .and. text == git_commit()
+      call file%get_attribute('/', 'resolved_input', input, error)
+      if (.not. allocated(error)) call file%get_attribute('/', 'git_commit', commit, error)
       if (.not. allocated(error)) call file%get_attribute('/', 't_reached', t_reached, error)
-      same = same .and. .not. allocated(error)
+      if (.not. allocated(error)) same = input == resolved_input .and. commit == git_commit()
       call file%close(error)
    end subroutine compare
 
@@ -332,7 +330,7 @@ contains
       end associate
    end function flush_is_due
 
-   !> The group `events` of a run that may have some, before `finish`. Without events its data sets are empty.
+   !> The group `events` of a run that may have some, behind all rows and before `finish`. Without events its data sets are empty.
    subroutine write_events(self, time, hinge, kind, energy_lost, error)
       class(run_file), intent(inout) :: self
       real(wp), intent(in) :: time(:)          !! [s]
@@ -350,6 +348,9 @@ contains
 
       call self%check_open(error)
       if (allocated(error)) return
+      call self%write_waiting_rows(error)
+      if (.not. self%file%is_open()) return
+      if (allocated(error)) deallocate (error) ! no room, which `finish` tells
       failure = self%reserve(bytes_at_end + size(names)*(bytes_of_layout + bytes_of_node) + size(time)*bytes_per_event)
       if (len(failure) > 0) then
          if (.not. allocated(self%no_room)) self%no_room = 'events find no room: '//failure

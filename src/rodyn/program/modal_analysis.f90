@@ -37,6 +37,7 @@ contains
       character(len=*), intent(in), optional :: input_text !! namelist as read, kept in the file
       logical, intent(in), optional :: force               !! replace an existing file
       logical, intent(in), optional :: quiet               !! print nothing
+      type(case_config) :: resolved !! with what is not given
       type(scene_type) :: scene
       type(motion_type) :: motion
       type(linear_model) :: model
@@ -51,14 +52,14 @@ contains
       call check_output_path(path, replace, error)
       if (.not. allocated(error)) call check_memory('n_rods = '//to_text(config%chain%n_rods), &
                                                     of_program + memory_of_scene(config), error)
-      if (.not. allocated(error)) call new_scene(scene, config, error)
+      if (.not. allocated(error)) call new_scene(scene, config, error, resolved)
       if (.not. allocated(error)) call new_motion(motion, scene, .false., error)
       if (.not. allocated(error)) call modes_at_start(motion, config, equilibrium, loads, .true., model, modes, error)
       if (allocated(error)) return
       origin%title = ''
       if (allocated(config%title)) origin%title = config%title
-      origin%resolved_input = resolved_case(config)
-      origin%notes = joined_lines(case_notes(config, .false.), notes_on(motion%dynamics%scene, model%q(:scene%n_dof), .false.))
+      origin%resolved_input = resolved_case(resolved)
+      origin%notes = joined_lines(case_notes(resolved, .false.), notes_on(motion%dynamics%scene, model%q(:scene%n_dof), .false.))
       origin%sundials_version = sundials_version()
       if (present(input_text)) origin%input = input_text
       call write_modes(path, replace, origin, motion%dynamics%scene, model, modes, equilibrium, error)

@@ -57,6 +57,7 @@ contains
       logical, intent(in), optional :: quiet               !! print nothing
       class(user_load), target, intent(inout), optional :: load !! forces of the caller's, beside those of the case
       character(len=*), intent(in), optional :: name       !! of the case, for what is refused of its keys
+      type(case_config) :: resolved !! with what is not given
       type(scene_type) :: scene
       type(motion_type), target :: motion
       type(recorder_type) :: recorder
@@ -79,7 +80,7 @@ contains
 
       call check_output_path(path, replace, error)
       if (.not. allocated(error)) call check_needs(config, path, error)
-      if (.not. allocated(error)) call new_scene(scene, config, error)
+      if (.not. allocated(error)) call new_scene(scene, config, error, resolved)
       if (.not. allocated(error)) call new_motion(motion, scene, config%output%ledger, error)
       if (allocated(error)) return
       if (present(load)) call motion%set_user_load(load)
@@ -90,7 +91,7 @@ contains
                       progress)
       if (allocated(error) .and. present(name)) error%message = name//': '//error%message
       if (allocated(error)) return
-      header%notes = joined_lines(case_notes(config, .true.), notes_on(scene, y(:scene%n_dof), config%output%ledger))
+      header%notes = joined_lines(case_notes(resolved, .true.), notes_on(scene, y(:scene%n_dof), config%output%ledger))
       if (.not. silent) then
          call print_line(describe_scene(scene, config%output%ledger))
          call print_line('method  '//driver%methods()//': '//driver%reason())
@@ -102,7 +103,7 @@ contains
       header%title = ''
       if (allocated(config%title)) header%title = config%title
       header%input = ''
-      header%resolved_input = resolved_case(config)
+      header%resolved_input = resolved_case(resolved)
       header%sundials_version = sundials_version()
       header%n_rods = scene%n
       header%n_rows = config%n_outputs + 1
@@ -117,18 +118,16 @@ contains
       call simulate(motion, driver, even_times(config%t_end, config%n_outputs), config%t_end, recorder, y, t, failure)
       call progress%finish()
       call system_clock(clock_end)
-      written = path
       earlier = .false.
       if (allocated(failure)) then
-         if (failure%exit_code == exit_stopped) written = path//'.stopped'
+         if (failure%exit_code == exit_stopped) call recorder%file%stop_at(path//'.stopped', .not. present(load), earlier)
       end if
-      if (written /= path) call recorder%file%stop_at(written, .not. present(load), earlier, error)
       if (earlier) call recorder%file%discard()
-      if (motion%events%watches .and. .not. (earlier .or. allocated(error))) call write_events(recorder%file, motion, error)
+      if (motion%events%watches .and. .not. earlier) call write_events(recorder%file, motion, error)
       if (.not. (earlier .or. allocated(error))) &
          call close_file(recorder, driver, motion, config, failure, &
                       real(clock_end - clock_start, wp)/real(clock_rate, wp), error)
-      written = recorder%file%path ! a failed run may have stepped aside
+      written = recorder%file%path ! a run that has stopped or failed may have stepped aside
       if (.not. silent .and. .not. allocated(error)) call print_events(motion)
       if (.not. silent .and. .not. allocated(error)) &
          call print_result(driver, recorder, written, config, t, &

@@ -19,7 +19,7 @@ module rodyn_scene
    use rodyn_loads, only: load_set, new_load_set, load_times
    use rodyn_kink_program, only: kink_set, new_kink_set, kink_times
    use rodyn_sorting, only: sorted_order
-   use rodyn_switch_times, only: add_switches, interval_ends, united_time
+   use rodyn_switch_times, only: add_switches, same_time, united_time
    implicit none (type, external)
    private
    public :: scene_type, new_scene
@@ -104,11 +104,12 @@ contains
    end function rod
 
    !> Compile a case. Fails, exit code 2, with all faults that `rodyn check` would find in it, in the same words.
-   subroutine new_scene(scene, given, error)
+   subroutine new_scene(scene, given, error, resolved)
       type(scene_type), intent(out) :: scene
       type(case_config), intent(in) :: given
       type(error_type), allocatable, intent(out) :: error
-      type(case_config) :: config !! with what is not given
+      type(case_config), intent(out), optional :: resolved !! the case with what is not given
+      type(case_config) :: config
       integer :: k
 
       call sound_case(given, config, error)
@@ -127,8 +128,7 @@ contains
       end associate
       call compile_rods(scene, config, error)
       if (allocated(error)) return
-      call compile_nodes(scene, config, error)
-      if (allocated(error)) return
+      call compile_nodes(scene, config)
       call new_kink_set(scene%kinks, config%chain%kink, config%kink_programs)
       call new_hinge_law(scene%hinges, config%chain, reshape([(scene%rods(scene%rod_of(k))%flexibility, k=1, scene%n)], &
                                                              [3, scene%n]), scene%quasistatic, config%model%dampers == 'exact', &
@@ -136,6 +136,7 @@ contains
       scene%n_q = scene%n_dof + size(scene%hinges%relaxing)
       call new_load_set(scene%loads, config%loads)
       call collect_switches(scene, config%t_end)
+      if (present(resolved)) resolved = config
    end subroutine new_scene
 
    !> Switches of loads, kinks and releases. What is released at a switch is released then, to the last digit.
@@ -148,8 +149,7 @@ contains
       associate (mechanisms => scene%hinges%mechanisms)
          times = [load_times(scene%loads), kink_times(scene%kinks), mechanisms%release_time]
          allocate (scene%switches(0))
-         call add_switches(scene%switches, interval_ends(pack(times, times > 0.0_wp), t_end))
-         scene%switches = scene%switches(:size(scene%switches) - 1) ! t_end itself
+         call add_switches(scene%switches, pack(times, times > 0.0_wp .and. times < t_end .and. .not. same_time(times, t_end)))
          do i = 1, size(mechanisms)
             mechanisms(i)%release_time = united_time(mechanisms(i)%release_time, scene%switches)
          end do
@@ -264,13 +264,11 @@ contains
       first = first(:n_distinct)
    end subroutine find_distinct
 
-   !> Node masses, with the mass of each rod shared by its two nodes when lumped. Every apparent mass that the
-   !> recursion divides by must be positive, so no rod and node may both be without mass.
-   subroutine compile_nodes(scene, config, error)
+   !> Node masses, with the mass of each rod shared by its two nodes when lumped. No rod and its node are both without mass
+   !> (`rodyn_case_rules`), so every apparent mass that the recursion divides by is positive.
+   subroutine compile_nodes(scene, config)
       type(scene_type), intent(inout) :: scene
       type(case_config), intent(in) :: config
-      type(error_type), allocatable, intent(out) :: error
-      character(len=12) :: number
       integer :: k
 
       allocate (scene%node_mass(0:scene%n), source=0.0_wp)
@@ -282,13 +280,6 @@ contains
             end associate
          end do
       end if
-      do k = 1, scene%n
-         if (scene%node_mass(k) > 0.0_wp) cycle
-         if (.not. scene%lumped .and. config%chain%mass_per_length(k) > 0.0_wp) cycle
-         write (number, '(i0)') k
-         call raise(error, '&chain: rod '//trim(number)//' and its outer node are both without mass', exit_bad_input)
-         return
-      end do
    end subroutine compile_nodes
 
 end module rodyn_scene
