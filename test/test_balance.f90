@@ -3,6 +3,7 @@ module test_balance
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
    use rodyn_case_config, only: case_config, hinge_config, kink_config, none_given
+   use rodyn_hinge_mechanism, only: kind_latched, kind_names, kind_released
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_motion, only: motion_type, new_motion, initial_state, state_invariants
    use rodyn_kinematics, only: invariants_type
@@ -308,7 +309,7 @@ contains
          associate (last => motion%n_controlled, tolerance => close_enough*(1.0_wp + maxval(energy)))
             call check_close(error, y(last + 1:), [energy(3) - energy(2), energy(1) - energy(2)], tolerance, 'work and loss')
             if (allocated(error)) return
-            call check(error, count(motion%events%log(:motion%events%n_logged)%kind == 1), released, 'releases')
+            call check(error, count(motion%events%log(:motion%events%n_logged)%kind == kind_released), released, 'releases')
             if (allocated(error)) return
             if (released > 0) call check_close(error, motion%events%log(released)%energy_lost, energy(1) - energy(2), tolerance, &
                                                'loss with the event')
@@ -457,7 +458,8 @@ contains
       config%initial%phi = 0.1_wp
       call integrate(config, [0.0_wp, 0.05_wp, 0.3_wp], run, error)
       if (allocated(error)) return
-      call check(error, run%n_events == 2 .and. run%events(1)%kind == 1 .and. run%events(2)%kind == 2, 'released and latched')
+      call check(error, run%n_events == 2 .and. &
+                 all(run%events(:2)%kind == [kind_released, kind_latched]), 'released and latched')
       if (allocated(error)) return
       call check(error, run%events(2)%time - 0.05_wp > 0.005_wp .and. run%events(2)%time - 0.05_wp < 0.03_wp, 'time of the latch')
       if (allocated(error)) return
@@ -495,7 +497,8 @@ contains
                        hinge_config(hinge=1, held=.true., release_after=0)]
       call integrate(config, [0.0_wp, 0.3_wp], run, error)
       if (allocated(error)) return
-      call check(error, run%n_events == 3 .and. all(run%events(:3)%kind == [1, 2, 1]), 'released, latched, released')
+      call check(error, run%n_events == 3 .and. &
+                 all(run%events(:3)%kind == [kind_released, kind_latched, kind_released]), 'released, latched, released')
       if (allocated(error)) return
       call check_close(error, run%events(:3)%time, spread(0.05_wp, 1, 3), 0.0_wp, 'at once')
       if (allocated(error)) return
@@ -577,7 +580,8 @@ contains
          associate (phi => run%rows(3)%phi(1))
             th = (100.0_wp*phi + 10.0_wp)/1400.0_wp
             loss = 50.0_wp*phi**2 - (150.0_wp*th**2 + 500.0_wp*(th - 0.01_wp)**2 + 50.0_wp*(phi - th)**2)
-            call check(error, run%events(1)%kind == 1 .and. run%events(2)%kind == 7, 'released, and at the upper stop')
+            call check(error, all(kind_names(run%events(:2)%kind) == [character(len=16) :: 'released', 'at_upper_stop']), &
+                       'released, and at the upper stop')
             if (allocated(error)) return
             call check_close(error, run%events(:2)%energy_lost, [loss, 0.0_wp], 1.0e-10_wp, 'loss')
             if (allocated(error)) return
@@ -639,7 +643,9 @@ contains
       call two_panels(config)
       call integrate(config, [0.0_wp, 5.0_wp, 8.0_wp, 12.0_wp], run, error)
       if (allocated(error)) return
-      call check(error, run%n_events == 4 .and. all(run%events(:4)%kind == [1, 2, 1, 2]), 'released and latched, twice')
+      call check(error, run%n_events == 4 .and. &
+                 all(run%events(:4)%kind == [kind_released, kind_latched, kind_released, kind_latched]), &
+                 'released and latched, twice')
       if (allocated(error)) return
       call check(error, all(run%events(:4)%hinge == [0, 0, 1, 1]), 'one after the other')
       if (allocated(error)) return
@@ -701,9 +707,9 @@ contains
          end select
          call integrate(config, [0.0_wp, 12.0_wp], run, error)
          if (allocated(error)) return
-         call check(error, count(run%events(:run%n_events)%kind == 1), merge(1, 2, i == 3), 'releases')
+         call check(error, count(run%events(:run%n_events)%kind == kind_released), merge(1, 2, i == 3), 'releases')
          if (allocated(error)) return
-         call check(error, count(run%events(:run%n_events)%kind == 2), 2, 'latches')
+         call check(error, count(run%events(:run%n_events)%kind == kind_latched), 2, 'latches')
          if (allocated(error)) return
          call check_close(error, run%rows(2)%phi, [0.0_wp, 0.01_wp], merge(2.0e-3_wp, 1.0e-9_wp, i == 2), 'angles')
          if (allocated(error)) return
@@ -740,7 +746,7 @@ contains
          if (allocated(error)) return
          call check(error, run%n_events, 1, 'events')
          if (allocated(error)) return
-         call check(error, run%events(1)%kind, merge(1, 2, i == 3), 'kind of the event')
+         call check(error, run%events(1)%kind, merge(kind_released, kind_latched, i == 3), 'kind of the event')
          if (allocated(error)) return
          if (i == 3) call check(error, run%rows(2)%phi(1) < -0.2_wp, 'hardly a motion')
          if (i < 3) call check_close(error, [run%events(1)%time, run%events(1)%energy_lost, run%rows(2)%phi(1)], &

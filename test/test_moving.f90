@@ -4,6 +4,7 @@ module test_moving
    use rodyn_errors, only: error_type
    use rodyn_case_config, only: none_given, case_config, hinge_config, kink_config, load_config
    use rodyn_kink_program, only: kink_set, kink_regime, new_kink_set, new_kink_regime, evaluate_kinks
+   use rodyn_hinge_mechanism, only: kind_latched
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_text, only: to_text
    use rodyn_motion, only: motion_type, new_motion, initial_state
@@ -1090,7 +1091,7 @@ contains
             error%message = kind_name(which)//': '//error%message
             return
          end if
-         latched = count(run%events(:run%n_events)%kind == 2)
+         latched = count(run%events(:run%n_events)%kind == kind_latched)
          call check(error, latched, 3, kind_name(which)//': latched')
          if (allocated(error)) return
          scale = maxval(run%rows%energy_kinetic + run%rows%energy_elastic)

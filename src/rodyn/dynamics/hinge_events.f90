@@ -211,7 +211,7 @@ contains
                call raise(error, 'hinge '//to_text(k)//' is held, but turns at the start')
                return
             end if
-            call mechanism%settle(at(k), merge(0.0_wp, turning(k), dynamics%scene%quasistatic))
+            call mechanism%choose_laws(at(k), merge(0.0_wp, turning(k), dynamics%scene%quasistatic))
          end associate
       end do
       call dynamics%change_hinges()
@@ -248,7 +248,7 @@ contains
       do i = 1, size(dynamics%scene%hinges%mechanisms)
          associate (mechanism => dynamics%scene%hinges%mechanisms(i))
             if (mechanism%is_constrained()) cycle
-            call mechanism%settle(self%theta(mechanism%hinge), self%theta_rate(mechanism%hinge))
+            call mechanism%choose_laws(self%theta(mechanism%hinge), self%theta_rate(mechanism%hinge))
          end associate
       end do
       call dynamics%change_hinges()
@@ -361,7 +361,8 @@ contains
       real(wp), intent(inout) :: p(:)
       real(wp), intent(inout) :: lost
       type(error_type), allocatable, intent(inout) :: error
-      call release(self, dynamics, dynamics%scene%hinges%mechanisms%release_time <= t, t, q, p, lost, error)
+      logical :: released
+      call release(self, dynamics, dynamics%scene%hinges%mechanisms%release_time <= t, t, q, p, lost, released, error)
       call release_followers(self, dynamics, t, q, p, lost, error)
    end subroutine release_due
 
@@ -373,32 +374,34 @@ contains
       real(wp), intent(inout) :: p(:)
       real(wp), intent(inout) :: lost
       type(error_type), allocatable, intent(inout) :: error
-      logical :: due(size(dynamics%scene%hinges%mechanisms))
+      logical :: due(size(dynamics%scene%hinges%mechanisms)), released
       integer :: i
 
-      do
+      released = .true.
+      do while (released)
          associate (mechanisms => dynamics%scene%hinges%mechanisms)
             due = [(any(mechanisms%hinge == mechanisms(i)%release_after .and. mechanisms%latched), i=1, size(due))]
-            if (allocated(error) .or. .not. any(due .and. mechanisms%held)) return
          end associate
-         call release(self, dynamics, due, t, q, p, lost, error)
+         call release(self, dynamics, due, t, q, p, lost, released, error)
       end do
    end subroutine release_followers
 
    !> Release those of some hinges that are held. Between massless rods joints jump then; what that costs belongs to the
    !> (last) release.
-   subroutine release(self, dynamics, due, t, q, p, lost, error)
+   subroutine release(self, dynamics, due, t, q, p, lost, released, error)
       class(event_set), intent(inout) :: self
       type(dynamics_type), intent(inout) :: dynamics
       logical, intent(in) :: due(:) !! of each mechanism
       real(wp), intent(in) :: t, q(:)
       real(wp), intent(inout) :: p(:)
       real(wp), intent(inout) :: lost
+      logical, intent(out) :: released !! some were
       type(error_type), allocatable, intent(inout) :: error
       real(wp) :: before, lost_here, lost_in_all, in_jump
       integer :: i, last
 
-      if (allocated(error) .or. .not. any(due .and. dynamics%scene%hinges%mechanisms%held)) return
+      released = any(due .and. dynamics%scene%hinges%mechanisms%held) .and. .not. allocated(error)
+      if (.not. released) return
       call find_joints(self, dynamics, t, q, p)
       before = elastic_energy(dynamics%scene, q, p)
       lost_in_all = 0.0_wp
@@ -456,7 +459,7 @@ contains
          if (i == 0) exit
          associate (mechanism => dynamics%scene%hinges%mechanisms(i))
             if (dynamics%scene%quasistatic .and. .not. mechanism%lock_stiffness > 0.0_wp) &
-               call mechanism%settle(mechanism%latch, 0.0_wp) ! its springs stay as they are there
+               call mechanism%choose_laws(mechanism%latch, 0.0_wp) ! its springs stay as they are there
          end associate
          call latch(self, dynamics, i, t, q, p, lost, error)
       end do

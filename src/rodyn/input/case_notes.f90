@@ -3,6 +3,9 @@
 module rodyn_case_notes
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: case_config, none_given
+   use rodyn_kink_program, only: kink_set, new_kink_set
+   use rodyn_loads, only: is_zero, load_set, new_load_set
+   use rodyn_switch_times, only: same_time
    use rodyn_text, only: formatted, tidy, to_text
    implicit none (type, external)
    private
@@ -57,7 +60,9 @@ contains
    pure function number(x) result(text)
       real(wp), intent(in) :: x
       character(len=:), allocatable :: text
-      if (abs(x) >= 1.0e-3_wp .and. abs(x) < 1.0e6_wp) then
+      if (abs(x) <= 0.0_wp) then
+         text = '0'
+      else if (abs(x) >= 1.0e-3_wp .and. abs(x) < 1.0e6_wp) then
          text = tidy(formatted(x, '(f0.6)'))
       else
          text = tidy(formatted(x, '(es13.5)'))
@@ -68,59 +73,71 @@ contains
    subroutine note_idle(config, text)
       type(case_config), intent(in) :: config
       character(len=:), allocatable, intent(inout) :: text
+      type(load_set) :: loads
+      type(kink_set) :: kinks
       character(len=:), allocatable :: why
       integer :: i
 
-      if (allocated(config%loads)) then
-         do i = 1, size(config%loads)
-            associate (load => config%loads(i))
-               why = idle_law(load%law, load%t_start, load%value, load%times, load%values, config%t_end)
-               if (load%law == 'sine_squared' .and. .not. abs(load%rate) > 0.0_wp) why = 'its rate is 0'
-               if (len(why) == 0 .and. load%law /= 'table' .and. .not. load%t_end > load%t_start) why = 'it ends as it begins'
-            end associate
-            if (len(why) > 0) call add(text, '&load, number '//to_text(i)//', never acts: '//why)
-         end do
-      end if
-      if (allocated(config%kink_programs)) then
-         do i = 1, size(config%kink_programs)
-            associate (program => config%kink_programs(i))
-               why = idle_law(program%law, program%t_start, program%value, program%times, program%values, config%t_end)
-            end associate
-            if (len(why) > 0) call add(text, '&kink_program, number '//to_text(i)//', moves nothing: '//why)
-         end do
-      end if
+      call new_load_set(loads, config%loads)
+      call new_kink_set(kinks, [real(wp) ::], config%kink_programs)
+      do i = 1, size(loads%loads)
+         associate (load => loads%loads(i))
+            why = idle_span(load%t_start, load%t_end, config%t_end)
+            if (len(why) == 0 .and. is_zero(load, config%t_end)) &
+               why = zero_of(config%loads(i)%law, config%loads(i)%value, 'its values are 0 as long as it acts')
+            if (config%spacecraft%motion == 'fixed' .and. load%node == 0) why = 'the spacecraft is fixed'
+         end associate
+         if (len(why) > 0) call add(text, '&load, number '//to_text(i)//', never acts: '//why)
+      end do
+      do i = 1, size(kinks%programs)
+         associate (program => kinks%programs(i))
+            why = ''
+            if (program%t_start < program%t_end .or. program%t_start >= config%t_end) & ! but for a step
+               why = idle_span(program%t_start, program%t_end, config%t_end)
+            if (len(why) == 0 .and. program%still) &
+               why = zero_of(config%kink_programs(i)%law, program%value, 'all its values are equal')
+         end associate
+         if (len(why) > 0) call add(text, '&kink_program, number '//to_text(i)//', moves nothing: '//why)
+      end do
       if (.not. allocated(config%hinges)) return
       do i = 1, size(config%hinges)
          associate (t => config%hinges(i)%release_time)
-            if (t > config%t_end .and. t < none_given) call add(text, '&hinge, hinge '//to_text(config%hinges(i)%hinge)// &
-               ', is never released: release_time = '//number(t)//' s is after the end of the case, '// &
-               number(config%t_end)//' s')
+            if ((t > config%t_end .or. same_time(t, config%t_end)) .and. t < none_given) &
+               call add(text, '&hinge, hinge '//to_text(config%hinges(i)%hinge)//', is never released: release_time = '// &
+                        number(t)//' s is not before the end of the case, '//number(config%t_end)//' s')
          end associate
       end do
    end subroutine note_idle
 
-   !> Why a law in time does nothing; empty if it does something.
-   function idle_law(law, t_start, value, times, values, end_of_case) result(why)
+   !> What makes a law in time vanish.
+   pure function zero_of(law, value, table) result(why)
       character(len=*), intent(in) :: law
-      real(wp), intent(in) :: t_start, value
-      real(wp), allocatable, intent(in) :: times(:), values(:) !! of a table
-      real(wp), intent(in) :: end_of_case
+      real(wp), intent(in) :: value
+      character(len=*), intent(in) :: table !! what it is if it is a table
       character(len=:), allocatable :: why
-      real(wp) :: begin
-
-      why = ''
-      begin = t_start
       if (law == 'table') then
-         if (.not. (allocated(times) .and. allocated(values))) return
-         if (size(times) == 0 .or. size(values) == 0) return
-         begin = max(t_start, times(1))
-         if (.not. any(abs(values) > 0.0_wp)) why = 'all its values are 0'
-      else if (.not. abs(value) > 0.0_wp) then
+         why = table
+      else if (abs(value) > 0.0_wp) then
+         why = 'its rate is 0'
+      else
          why = 'its value is 0'
       end if
-      if (begin >= end_of_case) why = 'it begins at t = '//number(begin)//' s, and the case ends at '// &
-                                      number(end_of_case)//' s'
-   end function idle_law
+   end function zero_of
+
+   !> Why nothing of an interval lies within the case; empty if something does.
+   function idle_span(t_start, t_end, end_of_case) result(why)
+      real(wp), intent(in) :: t_start, t_end, end_of_case !! [s]
+      character(len=:), allocatable :: why
+
+      why = ''
+      if (t_start >= end_of_case .or. same_time(t_start, end_of_case)) then
+         why = 'it begins at t = '//number(t_start)//' s, and the case ends at '//number(end_of_case)//' s'
+      else if (t_end <= 0.0_wp) then
+         why = 'it ends at t = '//number(t_end)//' s, and the case begins at 0 s'
+      else if (t_end <= t_start .or. same_time(t_start, t_end)) then
+         why = 'it begins at t = '//number(t_start)//' s, and ends at '//number(t_end)//' s'
+      end if
+   end function idle_span
 
    !> Angles that are beyond a whole turn and round: those are typed in degrees.
    subroutine note_degrees(config, text)

@@ -65,7 +65,7 @@ module rodyn_hinge_mechanism
       integer :: latch_side = 0             !! sign of the way to the latch; 0: there is none
       logical :: at_latch = .false.         !! not latched, but still where it began or was released: at its latch
    contains
-      procedure :: settle
+      procedure :: choose_laws
       procedure :: margin
       procedure :: change
       procedure :: lock
@@ -80,7 +80,7 @@ module rodyn_hinge_mechanism
 
 contains
 
-   !> Take over what is given of a hinge. Its law is that of the bare spring until `settle`.
+   !> Take over what is given of a hinge. Its law is that of the bare spring until `choose_laws`.
    pure subroutine new_mechanism(self, given, chain, dampers_apart)
       type(hinge_mechanism), intent(out) :: self
       type(hinge_config), intent(in) :: given
@@ -110,7 +110,7 @@ contains
    end subroutine new_mechanism
 
    !> Choose the laws that hold at a state to which no motion led. A stop that is left too fast to follow keeps its face there.
-   pure subroutine settle(self, theta, theta_rate)
+   pure subroutine choose_laws(self, theta, theta_rate)
       class(hinge_mechanism), intent(inout) :: self
       real(wp), intent(in) :: theta, theta_rate !! th [rad], th' [rad/s]
       integer :: i
@@ -128,7 +128,7 @@ contains
          self%slides = 0
          if (abs(theta_rate) > self%friction_velocity) self%slides = merge(1, -1, theta_rate > 0.0_wp)
       end if
-   end subroutine settle
+   end subroutine choose_laws
 
    !> Depth in the lower or upper stop.
    pure real(wp) function depth(self, i, theta)

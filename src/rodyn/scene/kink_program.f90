@@ -6,7 +6,7 @@
 module rodyn_kink_program
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: kink_config
-   use rodyn_switch_times, only: same_time
+   use rodyn_switch_times, only: last_before, middle_of, same_time
    implicit none (type, external)
    private
    public :: kink_program, kink_set, kink_regime, new_kink_set, kink_times, new_kink_regime, evaluate_kinks, program_value
@@ -17,6 +17,7 @@ module rodyn_kink_program
    type :: kink_program
       integer :: hinge = 0
       integer :: law = law_ramp
+      logical :: still = .false.                   !! it has the same value at all times
       real(wp) :: t_start = 0.0_wp, t_end = 0.0_wp !! [s]
       real(wp) :: value = 0.0_wp                   !! change or amplitude [rad]
       real(wp) :: rate = 0.0_wp                    !! of a sine [rad/s]
@@ -93,6 +94,7 @@ contains
          program%law = law_ramp
          if (same_time(given%t_start, given%t_end)) program%t_end = given%t_start ! a step
       end select
+      program%still = is_still(program)
    end subroutine new_program
 
    !> Second derivatives at the knots of the cubic spline that begins and ends at rest. With x' = 0 at both ends,
@@ -127,16 +129,18 @@ contains
       real(wp), intent(in) :: t_from, t_to !! [s]
       logical :: moves(size(set%programs))
       real(wp) :: middle, x(3)
-      integer :: i
+      integer :: i, n
 
-      middle = t_from + 0.5_wp*(t_to - t_from)
-      moves = set%programs%t_start < middle .and. middle < set%programs%t_end .and. .not. is_still(set%programs)
+      middle = middle_of(t_from, t_to)
+      moves = set%programs%t_start < middle .and. middle < set%programs%t_end .and. .not. set%programs%still
       allocate (regime%constant(0:size(set%constant) - 1), source=set%constant)
       allocate (regime%moving(count(moves)))
+      n = 0
       do i = 1, size(moves)
          associate (program => set%programs(i), kink => regime%constant(set%programs(i)%hinge))
             if (moves(i)) then
-               regime%moving(count(moves(:i))) = program
+               n = n + 1
+               call take_piece(regime%moving(n), program, middle)
             else if (program%t_start == program%t_end) then ! a step
                if (middle > program%t_start) kink = kink + program%value
             else
@@ -148,11 +152,32 @@ contains
    end subroutine new_kink_regime
 
    !> Does the program have the same value at all times?
-   elemental logical function is_still(program)
+   pure logical function is_still(program)
       type(kink_program), intent(in) :: program
-      is_still = .not. abs(program%value) > 0.0_wp
+      is_still = .not. abs(program%value) > 0.0_wp .or. (program%law == law_sine .and. .not. abs(program%rate) > 0.0_wp)
       if (program%law == law_table) is_still = .not. any(abs(program%values - program%values(1)) > 0.0_wp)
    end function is_still
+
+   !> What of a program counts around a time: of a table the knots on either side, and one more each for times beyond by rounding.
+   pure subroutine take_piece(piece, program, t)
+      type(kink_program), intent(out) :: piece
+      type(kink_program), intent(in) :: program
+      real(wp), intent(in) :: t !! [s]
+      integer :: first, last
+
+      piece%hinge = program%hinge
+      piece%law = program%law
+      piece%t_start = program%t_start
+      piece%t_end = program%t_end
+      piece%value = program%value
+      piece%rate = program%rate
+      if (program%law /= law_table) return
+      first = max(last_before(program%times, t) - 1, 1)
+      last = min(first + 3, size(program%times))
+      piece%times = program%times(first:last)
+      piece%values = program%values(first:last)
+      piece%bend = program%bend(first:last)
+   end subroutine take_piece
 
    !> gamma, gamma' and gamma'' of all hinges at time t.
    pure subroutine evaluate_kinks(regime, t, kink, kink_rate, kink_acceleration)
@@ -210,7 +235,7 @@ contains
       real(wp) :: a, b, h
       integer :: i
 
-      i = min(max(count(times <= t), 1), size(times) - 1)
+      i = min(last_before(times, t), size(times) - 1)
       h = times(i + 1) - times(i)
       b = (t - times(i))/h
       a = (times(i + 1) - t)/h

@@ -6,9 +6,10 @@
 module rodyn_loads
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: load_config
+   use rodyn_switch_times, only: last_before, middle_of
    implicit none (type, external)
    private
-   public :: load_set, new_load_set, load_times, load_regime, new_load_regime, load_forces, evaluate_loads
+   public :: load_set, new_load_set, load_times, is_zero, load_regime, new_load_regime, load_forces, evaluate_loads
 
    !> Words of the namelist as numbers, so that the right-hand side compares no text.
    integer, parameter :: law_constant = 1, law_sine_squared = 2, law_smooth_step = 3, law_table = 4
@@ -113,6 +114,19 @@ contains
       end associate
    end function drops
 
+   !> Is a load zero at all times before one, which is behind its beginning?
+   pure logical function is_zero(load, before)
+      type(load_type), intent(in) :: load
+      real(wp), intent(in) :: before !! [s]
+      if (load%law == law_table) then
+         associate (first => last_before(load%times, load%t_start), passed => count(load%times < min(before, load%t_end)))
+            is_zero = .not. any(abs(load%values(first:min(passed + 1, size(load%times)))) > 0.0_wp)
+         end associate
+      else
+         is_zero = .not. abs(load%value) > 0.0_wp .or. (load%law == law_sine_squared .and. .not. abs(load%rate) > 0.0_wp)
+      end if
+   end function is_zero
+
    !> All times where some load is not smooth, in no order [s].
    pure function load_times(set) result(times)
       type(load_set), intent(in) :: set
@@ -136,8 +150,7 @@ contains
       end do
    end function load_times
 
-   !> What acts between two neighbouring switch times (or ends of the run). The middle decides, for which the rounding of
-   !> times does not matter.
+   !> What acts between two neighbouring switch times (or ends of the run).
    subroutine new_load_regime(regime, set, t_from, t_to, n)
       type(load_regime), intent(out) :: regime
       type(load_set), intent(in) :: set
@@ -148,7 +161,7 @@ contains
       real(wp) :: middle
       integer :: i
 
-      middle = t_from + 0.5_wp*(t_to - t_from)
+      middle = middle_of(t_from, t_to)
       acting = pack([(i, i=1, size(set%loads))], set%loads%t_start < middle .and. middle < set%loads%t_end)
       allocate (pieces(size(acting)))
       do i = 1, size(acting)
@@ -192,24 +205,6 @@ contains
       case default ! the others stay what they are
       end select
    end function piece_of
-
-   !> The last of the times of a table that is not after t; 1 if none is.
-   pure integer function last_before(times, t) result(low)
-      real(wp), intent(in) :: times(:)
-      real(wp), intent(in) :: t
-      integer :: high, middle
-
-      low = 1
-      high = size(times) + 1
-      do while (high - low > 1)
-         middle = (low + high)/2
-         if (times(middle) <= t) then
-            low = middle
-         else
-            high = middle
-         end if
-      end do
-   end function last_before
 
    !> Forces at time t. Call first with `fresh`, at the start of a regime; then only what varies is written.
    pure subroutine evaluate_loads(forces, regime, t, fresh)

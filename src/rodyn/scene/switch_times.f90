@@ -7,7 +7,7 @@ module rodyn_switch_times
    use rodyn_sorting, only: sorted_order
    implicit none (type, external)
    private
-   public :: same_time, add_switches, united_time, interval_ends
+   public :: same_time, add_switches, united_time, interval_ends, middle_of, last_before
 
    !> Of a time: more than any sum or product of a few numbers is off, and more than the few units in the last place below
    !> which methods refuse to step.
@@ -76,5 +76,29 @@ contains
       real(wp), allocatable :: ends(:)
       ends = [pack(switches, switches < t_end .and. .not. same_time(switches, t_end)), t_end]
    end function interval_ends
+
+   !> A time between two neighbouring switches. It decides what holds there, since the rounding of times does not matter for it.
+   pure real(wp) function middle_of(t_from, t_to)
+      real(wp), intent(in) :: t_from, t_to !! [s]
+      middle_of = t_from + 0.5_wp*(t_to - t_from)
+   end function middle_of
+
+   !> The last of the times of a table that is not after t; 1 if none is.
+   pure integer function last_before(times, t) result(low)
+      real(wp), intent(in) :: times(:)
+      real(wp), intent(in) :: t
+      integer :: high, middle
+
+      low = 1
+      high = size(times) + 1
+      do while (high - low > 1)
+         middle = (low + high)/2
+         if (times(middle) <= t) then
+            low = middle
+         else
+            high = middle
+         end if
+      end do
+   end function last_before
 
 end module rodyn_switch_times
