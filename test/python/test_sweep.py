@@ -331,6 +331,28 @@ tell('', load('-hdf5', 'FILE'));
 """
 
 
+def test_what_was_in_vain_in_a_lane_counts(here):
+    """A case that gives up in a lane is computed again by itself: its work is that of both attempts."""
+    (here / "base.nml").write_text("""&case t_end = 1, n_outputs = 10 /
+&spacecraft mass = 122.5, inertia = 10 /
+&chain n_rods = 6, length = 1.5, mass_per_length = 1.696, hinge_stiffness = 1 /
+&model bending = 'rigid' /
+&initial phi = 0.1, 0.2, 0.1, 0, 1, 2, phi_rate = 6*3 /
+&load component = 'X', value = 1, t_start = 0.5 /
+&solver rtol = 1e-4, atol = 1e-6 /
+""")
+    text = "&sweep base = 'base.nml' LANES /\n&axis key = 'load(1).value', values = 1, 2, 3, 4, 5, 1e306 /\n"
+    counts = []
+    for name, lanes in (("alone", ", lanes = .false."), ("lanes", "")):
+        sweep(here, text.replace(" LANES", lanes), name=name, code=1)
+        with opened(here, name) as file:
+            assert list(file["status"].values) == 5*["done"] + ["failed"]
+            counts.append((file["n_rhs"].values, file["n_steps"].values))
+    (alone, alone_steps), (lanes, lanes_steps) = counts
+    assert (lanes[:5] == alone[:5]).all() and (lanes_steps[:5] == alone_steps[:5]).all()
+    assert lanes[5] > alone[5] + 100 and lanes_steps[5] > alone_steps[5] + 10  # half of 1 s, about 200 and 13
+
+
 def test_a_case_over_its_wall_limit_fails_alone_and_can_be_retried(here):
     text = "&sweep base = 'base.nml', probe_times = 0.05, case_seconds = {} /\n&axis key = 'case.t_end', values = 0.05, 400 /"
     sweep(here, text.format(0.3), code=1)

@@ -237,7 +237,7 @@ contains
          end if
       end do
       call make_texts('status', len('failed'), 'done or failed')
-      call make_texts('message', message_length, 'why the case failed, or warnings on its model')
+      call make_texts('message', message_length, 'why the case failed; or which methods gave up, and warnings on its model')
       call make('t_reached', [integer ::], 'real', 's', 'time of the last output before it failed; of a done case its end')
       call make('n_steps', [integer ::], 'integer', '1', 'internal steps')
       call make('n_rhs', [integer ::], 'integer', '1', 'right-hand sides')

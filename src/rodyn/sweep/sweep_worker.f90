@@ -61,6 +61,15 @@ module rodyn_sweep_worker
       real(wp) :: preparation = 0.0_wp !! wall time before the integration [s]
    end type lane_case
 
+   !> What was done on a case.
+   type :: work_type
+      integer(i8) :: n_steps = 0, n_rhs = 0
+      real(wp) :: wall_seconds = 0.0_wp        !! [s]
+      real(wp) :: integration_seconds = 0.0_wp !! [s]
+   end type work_type
+
+   type(work_type), parameter :: no_work = work_type()
+
    type :: queued
       type(lane_case), pointer :: case => null()
    end type queued
@@ -195,21 +204,23 @@ contains
       if (self%stopped) return
       call self%feed%next(ticket, case)
       self%ended = case == 0
-      if (.not. self%ended) call begin_case(self, ticket, case, self%in_lanes, new)
+      if (.not. self%ended) call begin_case(self, ticket, case, self%in_lanes, no_work, new)
    end subroutine prepare_next
 
    !> Prepare a case. If it cannot go in a lane, compute it at once.
-   subroutine begin_case(self, ticket, case, in_lanes, new)
+   subroutine begin_case(self, ticket, case, in_lanes, before, new)
       class(worker_type), intent(inout) :: self
       integer, intent(in) :: ticket, case
       logical, intent(in) :: in_lanes !! it may
+      type(work_type), intent(in) :: before !! on this case; its time is part of what the case may take
       type(lane_case), pointer, intent(out) :: new !! not associated: none for a lane
       type(driver_type) :: driver
       type(error_type), allocatable :: error
       integer(i8) :: clock_start, clock_end, rate
-      logical :: late
+      logical :: late, stop_now
 
       call system_clock(clock_start, rate)
+      clock_start = clock_start - nint(before%wall_seconds*real(rate, wp), i8)
       allocate (new)
       new%ticket = ticket
       call clear_result(new%kept, self%shape, case)
@@ -229,9 +240,15 @@ contains
                              new%keeper, late, error)
       end if
       call system_clock(clock_end)
-      new%kept%wall_seconds = real(clock_end - clock_start, wp)/real(rate, wp)
-      call conclude_case(self%sweep, new%keeper, late, error, new%kept)
-      call self%feed%keep(ticket, new%kept, self%stopped)
+      associate (kept => new%kept)
+         kept%wall_seconds = real(clock_end - clock_start, wp)/real(rate, wp)
+         kept%n_steps = kept%n_steps + before%n_steps
+         kept%n_rhs = kept%n_rhs + before%n_rhs
+         kept%integration_seconds = kept%integration_seconds + before%integration_seconds
+         call conclude_case(self%sweep, new%keeper, late, error, kept)
+         call self%feed%keep(ticket, kept, stop_now)
+      end associate
+      self%stopped = self%stopped .or. stop_now
       deallocate (new)
    end subroutine begin_case
 
@@ -270,7 +287,8 @@ contains
             kept%integration_seconds = member%seconds
             kept%wall_seconds = member%preparation + member%seconds
             if (member%gave_up .and. member%choice%automatic) then
-               call begin_case(self, member%ticket, kept%case, .false., none)
+               call begin_case(self, member%ticket, kept%case, .false., work_type(kept%n_steps, kept%n_rhs, kept%wall_seconds, &
+                                                                                  kept%integration_seconds), none)
             else
                if (.not. allocated(member%error)) &
                   call keep_final(member%motion, member%t_end, member%y, member%keeper, member%error)
