@@ -10,6 +10,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 
@@ -435,13 +436,40 @@ def test_mpirun_does_not_run_a_case_twice(tmp_path):
 # What is allowed but hardly meant
 
 
+@pytest.mark.parametrize(("group", "why"), [
+    ("&load law = 'table', times = 0, 0.01, values = 5, 5, t_start = 0.02, t_end = 0.03 /", "it begins at t = 0.02 s, and ends at 0.01 s"),
+    ("&load value = 5, t_start = -2, t_end = -1 /", "it ends at t = -1 s, and the case begins at 0 s"),
+    ("&load law = 'table', times = -2, -1, values = 5, 5 /", "it ends at t = -1 s, and the case begins at 0 s"),
+    ("&load law = 'table', times = 0.03, 0.04, values = 5, 5, t_end = 0.02 /", "it begins at t = 0.03 s, and ends at 0.02 s"),
+    ("&load law = 'table', times = 0, 0.05, 1, values = 0, 0, 5 /", "its values are 0 as long as it acts"),
+    ("&load law = 'sine_squared', value = 5, rate = 0 /", "its rate is 0"),
+    ("&load value = 5, t_start = 0.01, t_end = 0.01 /", "it begins at t = 0.01 s, and ends at 0.01 s"),
+    ("&load law = 'table', times = 0, 0.03, 1, values = 0, 0, 5 /", None),
+    ("&load law = 'table', times = -2, -1, values = 5, 5, after = 'hold' /", None),
+    ("&kink_program hinge = 0, law = 'sine', value = 0.1, rate = 0 /", "its rate is 0"),
+    ("&kink_program hinge = 0, law = 'table', times = 0.05, 1, values = 0, 1 /", "it begins at t = 0.05 s, and the case ends at 0.05 s"),
+    ("&kink_program hinge = 0, law = 'ramp', t_start = 0.01, t_end = 0.01, value = 0.1 /", None),
+    ("&hinge hinge = 0, held = .true., release_time = 0.05 /",
+     "release_time = 0.05 s is not before the end of the case, 0.05 s")])
+def test_what_never_acts_is_noted_whatever_the_cause(tmp_path, group, why):
+    write_case(tmp_path, TIMES + SPACECRAFT + CHAIN + group + "\n")
+    result = rodyn("check", "case.nml", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert [line.rpartition(": ")[2] for line in result.stdout.splitlines()[1:]] == ([why] if why else [])
+
+
+def test_loads_on_a_fixed_spacecraft_are_noted(tmp_path):
+    write_case(tmp_path, TIMES + "&spacecraft motion = 'fixed' /\n" + CHAIN + "&load component = 'X', value = 5 /\n")
+    assert "note    &load, number 1, never acts: the spacecraft is fixed" in rodyn("check", "case.nml", cwd=tmp_path).stdout
+
+
 def test_what_hardly_can_be_meant_is_noted(tmp_path):
     text = (TIMES + SPACECRAFT + CHAIN + "&load component = 'M', value = 5, t_start = 2, t_end = 3 /\n&load component = 'X' , value = 0 /\n"
             + "&load component = 'Y', law = 'table', times = 0, 1, values = 0, 0 /\n" + MOMENT
             + "&initial phi = 0.1, 45, -90, rotation = 7.1 /\n&hinge hinge = 1, held = .true., release_time = 5 /\n")
     notes = ["&load, number 1, never acts: it begins at t = 2 s, and the case ends at 0.05 s",
-             "&load, number 2, never acts: its value is 0", "&load, number 3, never acts: all its values are 0",
-             "&hinge, hinge 1, is never released: release_time = 5 s is after the end of the case, 0.05 s",
+             "&load, number 2, never acts: its value is 0", "&load, number 3, never acts: its values are 0 as long as it acts",
+             "&hinge, hinge 1, is never released: release_time = 5 s is not before the end of the case, 0.05 s",
              "&initial phi = 45 rad is 7.161972 turns; if degrees were meant, write 0.785398"]
     case = write_case(tmp_path, text)
     check = rodyn("check", case.name, cwd=tmp_path)
@@ -859,17 +887,17 @@ def test_a_signal_stops_a_run_that_can_be_made_again(tmp_path: pathlib.Path, nam
 
 
 def test_of_two_stops_the_more_rows_stay(tmp_path):
-    """A second, earlier stop costs nothing, a later one is kept; rows of another case are set aside."""
+    """A second, earlier stop costs nothing, a later one is kept; rows of another case stay where they are."""
     text = SCENES["flexible"].replace("t_end = 0.05, n_outputs = 5", "t_end = 1000, n_outputs = 10000000")
 
-    def stop(seconds: float) -> float:
+    def stop(seconds: float, name: str = "case.h5.stopped") -> float:
         with subprocess.Popen([RODYN, "run", "case.nml", "--quiet"], cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
             wait_for_start(tmp_path)
             time.sleep(seconds)
             process.terminate()
             errors = process.communicate(timeout=30)[1]
-        assert process.returncode == 75 and "case.h5.stopped" in errors, errors
-        with h5py.File(tmp_path / "case.h5.stopped") as rows:
+        assert process.returncode == 75 and f"in {name}" in errors, errors
+        with h5py.File(tmp_path / name) as rows:
             assert rows.attrs["t_reached"] == rows["time"][-1]
             return rows.attrs["t_reached"]
 
@@ -881,9 +909,28 @@ def test_of_two_stops_the_more_rows_stay(tmp_path):
     assert files(tmp_path) == ["case.h5.stopped", "case.nml"]
     longest = (tmp_path / "case.h5.stopped").read_bytes()
     write_case(tmp_path, text.replace("1500", "1501"))
-    stop(0.0)
+    assert stop(1.0, "case.h5.stopped-1") <= stop(2.0, "case.h5.stopped-1")
     assert files(tmp_path) == ["case.h5.stopped", "case.h5.stopped-1", "case.nml"]
-    assert (tmp_path / "case.h5.stopped-1").read_bytes() == longest
+    assert (tmp_path / "case.h5.stopped").read_bytes() == longest
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can work as somebody else")
+def test_rows_of_a_stopped_run_do_not_depend_on_a_file_of_somebody_else():
+    """In a directory such as /tmp nobody may rename what another user has stopped."""
+    with tempfile.TemporaryDirectory() as name:
+        place = pathlib.Path(name)
+        place.chmod(0o1777)
+        shutil.copy(RODYN, place / "rodyn")
+        write_case(place, SCENES["flexible"].replace("t_end = 0.05, n_outputs = 5", "t_end = 1000, n_outputs = 10000000"))
+        (place / "case.h5.stopped").write_text("of another user")
+        with subprocess.Popen([place / "rodyn", "run", "case.nml", "--quiet"], cwd=place, stderr=subprocess.PIPE, text=True,
+                              user=65534) as process:
+            wait_for_start(place)
+            process.terminate()
+            errors = process.communicate(timeout=30)[1]
+        assert process.returncode == 75 and "case.h5.stopped-1" in errors, errors
+        with h5py.File(place / "case.h5.stopped-1") as rows:
+            assert rows.attrs["status"] == b"stopped" and rows["time"][-1] == rows.attrs["t_reached"]
 
 
 def test_a_run_can_be_looked_at_while_it_grows(tmp_path):

@@ -13,7 +13,8 @@
 module rodyn_file_room
    use, intrinsic :: iso_c_binding, only: c_char, c_int, c_int64_t, c_null_char
    use rodyn_kinds, only: i8, wp
-   use rodyn_posix, only: error_text, last_failure, last_failure_is, posix_close, posix_fsync, posix_open
+   use rodyn_posix, only: efbig, eintr, einval, enodev, enosys, enotsup, error_text, last_failure, last_failure_is, posix_close, &
+      posix_fsync, posix_open
    use rodyn_resources, only: file_size_limit
    implicit none (type, external)
    private
@@ -21,8 +22,6 @@ module rodyn_file_room
 
    integer(c_int), parameter :: o_rdwr = 2, seek_end = 2                ! <fcntl.h>, <unistd.h>, Linux
    integer(c_int), parameter :: keep_size = 1, punch_hole = 2           ! <linux/falloc.h>
-   integer(c_int), parameter :: efbig = 27                              ! <errno.h>, Linux
-   integer, parameter :: eintr = 4, enodev = 19, einval = 22, enosys = 38, enotsup = 95
    integer(c_int64_t), parameter :: copying(3) = [int(z'9123683E', c_int64_t), int(z'2FC12FC1', c_int64_t), &
                                                   int(z'CA451A4E', c_int64_t)] ! <linux/magic.h> and others: what copies
    integer(i8), parameter :: bytes_of_copies = 262144

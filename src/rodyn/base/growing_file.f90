@@ -10,8 +10,8 @@
 module rodyn_growing_file
    use, intrinsic :: iso_c_binding, only: c_int, c_int64_t, c_loc, c_null_char, c_size_t
    use rodyn_kinds, only: i8
-   use rodyn_posix, only: last_failure, posix_close, posix_fsync, posix_open
-   use rodyn_posix_files, only: create_file, file_bytes, o_append, o_wronly, write_all
+   use rodyn_posix, only: last_failure, posix_close, posix_fsync, posix_open, write_all
+   use rodyn_posix_files, only: create_file, file_bytes, o_append, o_wronly
    implicit none (type, external)
    private
    public :: growing_file

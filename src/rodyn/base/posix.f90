@@ -3,7 +3,7 @@
 !> Calls that can fail return the reason as text, empty on success, so that callers word their own messages.
 module rodyn_posix
    use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_funptr, c_int, c_int16_t, c_intptr_t, &
-      c_long, c_null_char, c_null_funptr, c_null_ptr, c_ptr, c_size_t
+      c_loc, c_long, c_null_char, c_null_funptr, c_null_ptr, c_ptr, c_size_t
    implicit none (type, external)
    private
    public :: posix_close, posix_closedir, posix_fsync, posix_open, posix_opendir, posix_signal, sig_ign ! for `rodyn_posix_files`
@@ -11,12 +11,13 @@ module rodyn_posix
    public :: process_id, parent_id, host_name, utc_now
    public :: path_exists, same_path, is_directory, is_special, is_writable, parent_directory
    public :: sync_path, rename_over, rename_new, remove_file
-   public :: ignore_signal, sigpipe, sigxfsz, write_output, write_text, standard_output, standard_error
-   public :: error_text, last_failure, last_failure_is
+   public :: ignore_signal, sigpipe, sigxfsz, write_all, write_output, write_text, standard_output, standard_error
+   public :: error_text, last_failure, last_failure_is, eacces, eagain, eexist, efbig, eintr, einval, enodev, enosys, enotsup
 
    integer(c_int), parameter :: f_ok = 0, w_ok = 2, x_ok = 1               ! <unistd.h>
    integer(c_int), parameter :: o_rdonly = 0                               ! <fcntl.h>
-   integer(c_int), parameter :: eperm = 1, enomem = 12, eexist = 17, emlink = 31, enosys = 38, enotsup = 95 ! <errno.h>, Linux
+   integer(c_int), parameter :: eperm = 1, eintr = 4, eagain = 11, enomem = 12, eacces = 13, eexist = 17 ! <errno.h>, Linux
+   integer(c_int), parameter :: enodev = 19, einval = 22, efbig = 27, emlink = 31, enosys = 38, enotsup = 95 ! likewise
    integer(c_int), parameter :: sigpipe = 13, sigxfsz = 25                 ! <signal.h>, Linux
    integer(c_int), parameter :: standard_output = 1, standard_error = 2    ! <unistd.h>
    integer(c_intptr_t), parameter :: sig_ign = 1_c_intptr_t                ! <signal.h>
@@ -42,12 +43,11 @@ module rodyn_posix
          integer(c_int) :: status
       end function posix_gethostname
 
-      ! variadic in C; without its third argument the call is an ordinary one
-      function posix_write(descriptor, bytes, count) result(written) bind(c, name='write')
-         import :: c_char, c_int, c_intptr_t, c_size_t
+      function posix_write(descriptor, data, count) result(written) bind(c, name='write')
+         import :: c_int, c_intptr_t, c_ptr, c_size_t
          implicit none (type, external)
          integer(c_int), intent(in), value :: descriptor
-         character(kind=c_char), intent(in) :: bytes(*)
+         type(c_ptr), intent(in), value :: data
          integer(c_size_t), intent(in), value :: count
          integer(c_intptr_t) :: written
       end function posix_write
@@ -61,6 +61,7 @@ module rodyn_posix
          integer(c_intptr_t) :: n
       end function posix_read
 
+      ! variadic in C; without its third argument the call is an ordinary one
       function posix_open(path, flags) result(descriptor) bind(c, name='open')
          import :: c_char, c_int
          implicit none (type, external)
@@ -402,24 +403,34 @@ contains
    !> Write a text to an open file.
    function write_text(descriptor, text) result(failure)
       integer(c_int), intent(in) :: descriptor
-      character(len=*), intent(in) :: text
+      character(len=*), intent(in), target :: text
       character(len=:), allocatable :: failure !! empty on success
-      integer(c_int), parameter :: eintr = 4
+      failure = write_all(descriptor, c_loc(text), len(text, kind=c_size_t))
+   end function write_text
+
+   !> Hand all bytes to the system: in one call, unless it takes less or is interrupted.
+   function write_all(descriptor, data, bytes) result(failure)
+      integer(c_int), intent(in) :: descriptor
+      type(c_ptr), intent(in) :: data
+      integer(c_size_t), intent(in) :: bytes
+      character(len=:), allocatable :: failure !! empty on success
+      character(kind=c_char), pointer :: rest(:)
+      integer(c_size_t) :: done
       integer(c_intptr_t) :: written
-      integer :: done
 
       failure = ''
       done = 0
-      do while (done < len(text))
-         written = posix_write(descriptor, text(done + 1:), int(len(text) - done, c_size_t))
+      if (bytes > 0) call c_f_pointer(data, rest, [bytes])
+      do while (done < bytes)
+         written = posix_write(descriptor, c_loc(rest(done + 1)), bytes - done)
          if (written > 0) then
-            done = done + int(written)
+            done = done + written
          else if (errno() /= eintr) then
             failure = last_failure()
             return
          end if
       end do
-   end function write_text
+   end function write_all
 
    !> Everything that can be read behind a path, whatever its kind: a file, a pipe, a device; its size is not asked for.
    subroutine read_all(path, most, text, failure)
@@ -445,7 +456,6 @@ contains
       integer, intent(in) :: most
       character(len=:), allocatable, intent(out) :: text
       character(len=:), allocatable, intent(out) :: failure
-      integer(c_int), parameter :: eintr = 4
       character(len=:), allocatable :: buffer
       integer(c_intptr_t) :: n
       integer :: length

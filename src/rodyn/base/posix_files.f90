@@ -3,26 +3,25 @@
 !> Calls that can fail return the reason as text, empty on success.
 module rodyn_posix_files
    use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_funloc, c_funptr, c_int, c_int16_t, &
-      c_int64_t, c_loc, c_long, c_null_char, c_ptr, c_size_t
+      c_int64_t, c_loc, c_null_char, c_ptr, c_size_t
    use rodyn_checksum, only: crc64_text
    use rodyn_errors, only: error_type, exit_bad_input, raise
    use rodyn_kinds, only: i8
-   use rodyn_posix, only: ignore_signal, last_failure, last_failure_is, parent_directory, path_exists, rename_over, sig_ign, &
-      sync_path, posix_close, posix_closedir, posix_fsync, posix_open, posix_opendir, posix_signal
+   use rodyn_posix, only: eacces, eagain, eexist, ignore_signal, last_failure, last_failure_is, parent_directory, path_exists, &
+      rename_over, sig_ign, sync_path, write_all, posix_close, posix_closedir, posix_fsync, posix_open, posix_opendir, posix_signal
    use rodyn_text, only: to_text
    implicit none (type, external)
    private
    public :: make_directory, list_directory
    public :: write_words, read_words, write_text_file, append_text, file_bytes, file_checksum, rename_aside
-   public :: create_file, write_all, o_append, o_wronly ! for `rodyn_growing_file`
+   public :: create_file, o_append, o_wronly ! for `rodyn_growing_file`
    public :: lock_file, open_lock, take_lock, lock_holder, release_lock
-   public :: watch_signals, stop_signal, is_stop_asked
+   public :: watch_signals, stop_signal, stop_signals, is_stop_asked
 
    integer(c_int), parameter :: o_wronly = 1, o_append = 1024            ! <fcntl.h>, Linux
    integer(c_int), parameter :: f_getlk = 5, f_setlk = 6, f_setlkw = 7   ! <fcntl.h>, Linux, 64 bit
    integer(c_int16_t), parameter :: f_wrlck = 1, f_unlck = 2, seek_set = 0
    integer(c_int), parameter :: file_mode = int(o'644', c_int), directory_mode = int(o'755', c_int)
-   integer, parameter :: eagain = 11, eacces = 13, eexist = 17           ! <errno.h>
    integer(i8), parameter :: probe = 2_i8**51                            !! byte on which locks are tried
    !> Signals that ask to stop, <signal.h> of Linux. SIGXCPU comes at the soft limit of CPU time, some seconds before the end.
    integer(c_int), parameter :: watched(6) = [1_c_int, 2_c_int, 10_c_int, 12_c_int, 15_c_int, 24_c_int]
@@ -58,15 +57,6 @@ module rodyn_posix_files
          integer(c_int), value :: mode
          integer(c_int) :: descriptor
       end function posix_creat
-
-      function posix_write(descriptor, data, bytes) result(written) bind(c, name='write')
-         import :: c_int, c_long, c_ptr, c_size_t
-         implicit none (type, external)
-         integer(c_int), value :: descriptor
-         type(c_ptr), value :: data
-         integer(c_size_t), value :: bytes
-         integer(c_long) :: written
-      end function posix_write
 
       function posix_mkdir(path, mode) result(status) bind(c, name='mkdir')
          import :: c_char, c_int
@@ -238,29 +228,6 @@ contains
       status = posix_close(descriptor)
       if (status /= 0 .and. len(failure) == 0) failure = last_failure()
    end function write_and_close
-
-   !> Hand all bytes to the system: in one call, unless it takes less.
-   function write_all(descriptor, data, bytes) result(failure)
-      integer(c_int), intent(in) :: descriptor
-      type(c_ptr), intent(in) :: data
-      integer(c_size_t), intent(in) :: bytes
-      character(len=:), allocatable :: failure
-      character(kind=c_char), pointer :: rest(:)
-      integer(c_size_t) :: done
-      integer(c_long) :: written
-
-      failure = ''
-      done = 0
-      if (bytes > 0) call c_f_pointer(data, rest, [bytes])
-      do while (done < bytes)
-         written = posix_write(descriptor, c_loc(rest(done + 1)), bytes - done)
-         if (written <= 0) then
-            failure = last_failure()
-            return
-         end if
-         done = done + written
-      end do
-   end function write_all
 
    !> Append a text in one write and put it onto the disk.
    function append_text(path, text) result(failure)
@@ -446,6 +413,17 @@ contains
    logical function is_stop_asked()
       is_stop_asked = findloc(watched, caught, dim=1) > 0
    end function is_stop_asked
+
+   !> The names of all of them, 'SIGHUP, ... or SIGXCPU'.
+   function stop_signals() result(names)
+      character(len=:), allocatable :: names
+      integer :: i
+
+      names = trim(watched_names(1))
+      do i = 2, size(watched_names)
+         names = names//trim(merge(' or', ',  ', i == size(watched_names)))//' '//trim(watched_names(i))
+      end do
+   end function stop_signals
 
    !> Name of the signal that asks to stop; empty: none came.
    function stop_signal() result(name)

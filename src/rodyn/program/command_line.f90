@@ -7,7 +7,7 @@ module rodyn_command_line
    use rodyn_input_texts, only: input_texts, is_result_file, is_stream, read_input_texts
    use rodyn_launcher, only: direct_launch, launch_type
    use rodyn_modal_analysis, only: analyse_modes
-   use rodyn_posix_files, only: watch_signals
+   use rodyn_posix_files, only: stop_signals, watch_signals
    use rodyn_run, only: check_steps, run_case
    use rodyn_posix, only: ignore_signal, same_path, sigpipe, write_output
    use rodyn_resources, only: ensure_stack
@@ -415,7 +415,8 @@ contains
                 '                     FILE.h5.failed'//nl// &
                 '  --quiet            print nothing but errors'//nl// &
                 'Exit codes: 0 done, 1 the run failed (the file holds all rows until then), 2 bad input,'//nl// &
-                '75 stopped by SIGTERM, SIGUSR1 or SIGINT (rows until then in FILE.h5.stopped; run again).'
+                '75 stopped by '//stop_signals()//nl// &
+                '(rows until then in FILE.h5.stopped; run again).'
       case ('modes')
          text = 'rodyn modes CASE.nml [--equilibrium | --loads] [--output FILE.h5] [--force] [--quiet]'//nl// &
                 '  Linearise the scene in full at its initial state, without its loads. Natural frequencies,'//nl// &
@@ -442,7 +443,7 @@ contains
                 '                     stays as sweep.h5.before until the new one is there'//nl// &
                 '  --quiet            print nothing but errors'//nl// &
                 'Exit codes: 0 done, 1 a case failed (its states are NaN) or the sweep is incomplete, 2 bad input,'//nl// &
-                '75 stopped by SIGTERM, SIGUSR1 or SIGINT.'
+                '75 stopped by '//stop_signals()//'.'
       case ('check')
          text = 'rodyn check FILE.nml [--quiet]'//nl// &
                 '  Validate only: print every fault of the file at once; of a result, those of its stored input.'//nl// &
