@@ -87,7 +87,7 @@ contains
          scale_rate = maxval(abs(reference(a + 1:a + n)))
          do i_tolerance = 1, size(tolerances)
             call choose_method(choice, options_for(tolerances(i_tolerance)), motion, spread(0.0_wp, 1, 2*scene%n_dof), &
-                               0.0_wp, t_end, n_chunks, spread(.false., 1, size(candidates)))
+                               0.0_wp, t_end, n_chunks, spread(.false., 1, size(candidates)), huge(1.0_wp))
             chosen = choice%method
             if (choice%options%order > 0) write (chosen, '(a, 1x, i0)') choice%method, choice%options%order
             do i_method = 1, size(methods)

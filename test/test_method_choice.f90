@@ -174,7 +174,7 @@ contains
       if (allocated(error)) return
       call motion%dynamics%set_regime(0.0_wp, record%t_end)
       call choose_method(choice, options, motion, spread(0.0_wp, 1, 2*scene%n_dof), 0.0_wp, record%t_end, 1, &
-                         spread(.false., 1, size(candidates)))
+                         spread(.false., 1, size(candidates)), huge(1.0_wp))
       call run(scene, choice%method, choice%options, record%t_end, longest_run/(1.0_wp + 0.37_wp*n), y, chosen)
       if (.not. chosen < huge(1.0_wp)) return
       record%scenes = record%scenes + 1

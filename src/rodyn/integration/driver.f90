@@ -4,11 +4,12 @@
 !> A choice (`rodyn_method_choice`) holds for the laws that hinges have when it is made. At a time that is known before, as that of
 !> a release, it is made for laws that are new; for others the last one is taken again. After an event the run goes on by
 !> explicit steps: where the next event comes soon, nothing is gained by a choice, so it is made after `probation` right-hand
-!> sides. Where BDF is slower than explicit steps would be, the choice is made anew, too. So what choices cost is bounded by what
-!> the run costs. A method that gives up is left for good, and another one goes on from the last good state.
+!> sides. Where BDF is slower than explicit steps would be, the choice is made anew, too. All later trials together may cost a
+!> share of what the run has cost; one that this ends before it knows enough is made again when the run has cost twice as much.
+!> A method that gives up is left for good, and another one goes on from the last good state.
 module rodyn_driver
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-   use rodyn_kinds, only: wp
+   use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type, exit_stopped
    use rodyn_integrator, only: integrator_type, monitor_type, solver_options, solver_statistics, time_text
    use rodyn_integrators, only: new_integrator
@@ -39,6 +40,7 @@ module rodyn_driver
    type :: verdict_type
       integer, allocatable :: laws(:) !! see `laws_of`
       integer :: member = 0
+      character(len=:), allocatable :: reason
       real(wp) :: pace = 0.0_wp       !! of the best even method [s]
    end type verdict_type
 
@@ -65,8 +67,10 @@ module rodyn_driver
       real(wp), private :: effort_begun = 0.0_wp     !! likewise, when it was put to work
       real(wp), private :: spent = 0.0_wp            !! effort of the run until then
       real(wp), private :: tried = 0.0_wp            !! effort of choices
+      real(wp), private :: next_choice = 0.0_wp      !! effort of the run before which none is made
       real(wp), private :: t_last = 0.0_wp           !! the last good state [s]
       real(wp), allocatable, private :: y_last(:)    !! (n_states)
+      character(len=:), allocatable, private :: why  !! the next method, in words
       type(error_type), allocatable, private :: cause !! why the last method gave up
       real(wp), private :: t_cause = 0.0_wp          !! [s]
    contains
@@ -145,15 +149,20 @@ contains
       t_until = min(self%t_end, next_release(motion, t))
       out = self%members%gave_up
       call choose_method(choice, self%options, motion, y(:motion%n_controlled), t, t_until, &
-                         nint(self%n_outputs*((t_until - t)/self%t_end)), out, self%monitor)
+                         nint(self%n_outputs*((t_until - t)/self%t_end)), out, most_trial(self), self%monitor)
       self%n_choices = self%n_choices + 1
       self%tried = self%tried + choice%effort + effort_of_rates
+      self%on_probation = .not. choice%conclusive
+      if (self%on_probation) self%next_choice = 2.0_wp*effort_of_run(self)
       member = findloc(self%members%gave_up, .false., dim=1)
       do i = 1, size(candidates)
          if (candidates(i)%method == choice%method .and. candidates(i)%order == choice%options%order .and. &
              .not. self%members(i)%gave_up) member = i
       end do
-      verdict = verdict_type(laws_of(motion), member, merge(choice%pace, 0.0_wp, choice%tried .and. member > n_even))
+      self%pace = 0.0_wp
+      if (self%on_probation) return
+      verdict = verdict_type(laws_of(motion), member, choice%reason(), &
+                             merge(choice%pace, 0.0_wp, choice%tried .and. member > n_even))
       self%pace = verdict%pace
       i = place_of(self, verdict%laws)
       if (i > 0) then
@@ -162,6 +171,14 @@ contains
          self%verdicts = [verdict, self%verdicts(:min(size(self%verdicts), most_verdicts - 1))]
       end if
    end subroutine judge
+
+   !> Effort that a trial may cost now. The first, and one for want of explicit steps, as much as it takes.
+   real(wp) function most_trial(self)
+      type(driver_type), intent(inout) :: self
+      most_trial = huge(1.0_wp)
+      if (self%n_choices > 0 .and. .not. self%members(1)%gave_up) &
+         most_trial = max(trials_free, trials_free + trial_share*effort_of_run(self) - self%tried)
+   end function most_trial
 
    !> When the next hinge that is held will be released [s].
    pure real(wp) function next_release(motion, t)
@@ -202,6 +219,14 @@ contains
       end do
    end function place_of
 
+   !> Where the verdict on today's laws stands; 0: there is none, or its method has given up.
+   pure integer function known_verdict(self)
+      type(driver_type), intent(in) :: self
+      known_verdict = place_of(self, laws_of(self%motion))
+      if (known_verdict == 0) return
+      if (self%members(self%verdicts(known_verdict)%member)%gave_up) known_verdict = 0
+   end function known_verdict
+
    !> First start, or exact restart; before it, the method that fits what begins here.
    subroutine start(self, t, y, error)
       class(driver_type), intent(inout) :: self
@@ -224,20 +249,32 @@ contains
       integer, intent(out) :: member
       integer :: known
 
-      known = place_of(self, laws_of(self%motion))
+      known = known_verdict(self)
       self%on_probation = .false.
       self%pace = 0.0_wp
       member = self%now
       if (known > 0) member = self%verdicts(known)%member
       if (known > 0 .and. (self%timed .or. member <= n_even)) then
-         self%pace = self%verdicts(known)%pace
-      else if (self%timed .or. self%members(1)%gave_up) then
+         call follow(self, known, member)
+      else if ((self%timed .and. may_choose(self)) .or. self%members(1)%gave_up) then
          call judge_here(self, member)
       else
          self%on_probation = .true.
+         self%why = 'explicit steps after an event'
          member = 1
       end if
    end subroutine reconsider
+
+   !> The method of a verdict.
+   subroutine follow(self, known, member)
+      type(driver_type), intent(inout) :: self
+      integer, intent(in) :: known
+      integer, intent(out) :: member
+      self%on_probation = .false.
+      self%pace = self%verdicts(known)%pace
+      self%why = self%verdicts(known)%reason
+      member = self%verdicts(known)%member
+   end subroutine follow
 
    !> Choose anew, at the last good state.
    subroutine judge_here(self, member)
@@ -246,8 +283,8 @@ contains
       type(method_choice) :: choice
 
       call judge(self, self%motion, self%t_last, self%y_last, choice, member)
-      if (self%members(self%now)%gave_up .or. self%name(member) == self%name(self%now)) return
-      call tell(self, 'from t = '//time_text(self%t_last)//' s '//choice%method//': '//choice%reason())
+      self%why = choice%reason()
+      if (.not. choice%conclusive) self%why = 'explicit steps, until a trial is worth its effort'
    end subroutine judge_here
 
    !> One more line of the history.
@@ -272,6 +309,8 @@ contains
       integer, value :: member
       type(error_type), allocatable, intent(out) :: error
 
+      if (self%begun .and. self%name(member) /= self%name(self%now) .and. .not. self%members(self%now)%gave_up) &
+         call tell(self, 'from t = '//time_text(self%t_last)//' s '//self%name(member)//': '//self%why)
       do
          call employ(self, member, error)
          if (.not. allocated(error)) then
@@ -324,14 +363,14 @@ contains
    !> How far the member at work may go until it is looked at.
    subroutine limit_steps(self)
       type(driver_type), intent(inout) :: self
-      integer :: most
+      integer(i8) :: most
       most = self%options%max_steps
       if (self%on_probation) then
-         most = min(most, int(self%n_steps) + ceiling(short_probation/explicit_step))
+         most = min(most, self%n_steps + ceiling(short_probation/explicit_step))
       else if (self%pace > 0.0_wp) then
-         most = min(most, int(self%n_steps) + watch_steps)
+         most = min(most, self%n_steps + watch_steps)
       end if
-      self%members(self%now)%integrator%options%max_steps = most
+      self%members(self%now)%integrator%options%max_steps = int(most)
    end subroutine limit_steps
 
    !> Integrate to exactly t_out, or to an event before or at it.
@@ -402,13 +441,10 @@ contains
 
       effort = effort_of_member(self) - self%effort_window
       if (self%on_probation) then
-         known = place_of(self, laws_of(self%motion))
+         known = known_verdict(self)
          if (known > 0) then
-            self%on_probation = .false.
-            member = self%verdicts(known)%member
-            self%pace = self%verdicts(known)%pace
+            call follow(self, known, member)
          else if (effort >= probation .and. may_choose(self)) then
-            self%on_probation = .false.
             call judge_here(self, member)
          end if
          return
@@ -421,7 +457,7 @@ contains
    !> Whether choices have cost so little that another one can be afforded.
    logical function may_choose(self)
       type(driver_type), intent(inout) :: self
-      may_choose = self%tried <= trials_free + trial_share*effort_of_run(self)
+      may_choose = self%tried <= trials_free + trial_share*effort_of_run(self) .and. effort_of_run(self) >= self%next_choice
    end function may_choose
 
    !> Another method in place of the one at work, which has given up; `error` is left if there is none.

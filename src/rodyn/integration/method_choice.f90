@@ -25,6 +25,7 @@ module rodyn_method_choice
       type(solver_options) :: options         !! the user's, with the order that was chosen
       logical :: automatic = .false.          !! `auto` chose
       logical :: tried = .false.              !! after a trial
+      logical :: conclusive = .true.          !! otherwise the trial was too short, and this is what is safe
       real(wp) :: effort = 0.0_wp             !! of the trial, in right-hand sides
       real(wp) :: pace = 0.0_wp               !! of the best even method, expected: time for an effort of 1 [s]
       type(fast_rates) :: rates               !! of the scene
@@ -45,7 +46,7 @@ module rodyn_method_choice
 contains
 
    !> The method that fits a motion from t on, among those that are not out.
-   subroutine choose_method(choice, options, motion, y, t, t_end, n_outputs, out, monitor)
+   subroutine choose_method(choice, options, motion, y, t, t_end, n_outputs, out, most_trial, monitor)
       type(method_choice), intent(out) :: choice
       type(solver_options), intent(in) :: options !! of the user
       type(motion_type), intent(in) :: motion     !! in the regime that begins or goes on at t
@@ -53,6 +54,7 @@ contains
       real(wp), intent(in) :: t, t_end !! until when it shall serve [s]
       integer, intent(in) :: n_outputs !! states between steps that are wanted meanwhile
       logical, intent(in) :: out(size(candidates)) !! methods that are of no use
+      real(wp), intent(in) :: most_trial !! effort that a trial may cost
       class(monitor_type), target, intent(inout), optional :: monitor !! of the run; what is chosen after a stop is of no use
       real(wp) :: span, ratio, expected(n_even), forecast(size(candidates)), outputs(size(candidates))
       logical :: available(n_even)
@@ -83,8 +85,10 @@ contains
             return
          end if
          call try_methods(motion, y, t, options, minval([t_end, pack(scene%switches, scene%switches > t)]), t_end, rates, &
-                          expected, vibrating(rates, span)*span, out, forecast, choice%effort, monitor)
+                          expected, vibrating(rates, span)*span, out, most_trial, forecast, choice%effort, choice%conclusive, &
+                          monitor)
       end associate
+      if (.not. choice%conclusive) return
       choice%pace = span/minval(forecast(:n_even))
       forecast = forecast + outputs
       forecast(:n_even) = forecast(:n_even)/lead

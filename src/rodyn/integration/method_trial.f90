@@ -36,6 +36,7 @@ module rodyn_method_trial
    real(wp), parameter :: own_share = 0.2_wp          !! of its own run that the best candidate is tried on
    real(wp), parameter :: growing_share = 0.7_wp      !! likewise where its pace still grows
    real(wp), parameter :: even_share = 0.7_wp         !! of the run of the best even method, likewise
+   real(wp), parameter :: most_share = 1.0_wp         !! of that, for all candidates together
    real(wp), parameter :: expectation_error = 3.0_wp  !! factor by which expectations may be wrong
    real(wp), parameter :: even_trial = 0.1_wp         !! of its run that an even method is tried on
    real(wp), parameter :: bounded = 0.7_wp            !! phase in a step of BDF above order 2 that vibrations hold back
@@ -160,7 +161,8 @@ contains
    !> and the trial ends when the best has a share of its run behind it. The pace of the even methods is known to a factor of 3
    !> beforehand; only where that leaves a doubt at the end they are tried, too (and collocation from the first where dampers calm
    !> the vibrations).
-   subroutine try_methods(motion, y, t, options, t_first, t_end, rates, expected, quiet_after, out, forecast, effort, monitor)
+   subroutine try_methods(motion, y, t, options, t_first, t_end, rates, expected, quiet_after, out, most, forecast, effort, &
+                          conclusive, monitor)
       type(motion_type), intent(in) :: motion       !! in the regime that begins or goes on at t
       real(wp), intent(in) :: y(:)                  !! state at t, without quadratures
       real(wp), intent(in) :: t                     !! [s]
@@ -171,8 +173,10 @@ contains
       real(wp), intent(in) :: expected(n_even)      !! effort of the even methods; huge: of no use here
       real(wp), intent(in) :: quiet_after           !! time in which dampers will have calmed the fastest vibrations [s]
       logical, intent(in) :: out(size(candidates))  !! those of no use
+      real(wp), intent(in) :: most                  !! effort that the trial may cost
       real(wp), intent(out) :: forecast(size(candidates))
       real(wp), intent(out) :: effort               !! spent on the trial
+      logical, intent(out) :: conclusive            !! otherwise `most` ended it, and the forecasts are worth little
       class(monitor_type), target, intent(inout), optional :: monitor !! may end the trial, which then tells nothing
       type(trial_monitor), target :: listener
       type(runner) :: runners(size(candidates))
@@ -190,6 +194,7 @@ contains
       first = min(first_effort, first_share*minval(expected))
       allowed = first
       even_tried = .false.
+      conclusive = .true.
       do
          call follow_collocation()
          do i = n_even + 1, size(candidates)
@@ -209,6 +214,8 @@ contains
             even_tried = .true.
             if (over .or. is_spent()) exit
          end if
+         conclusive = after_next_round() <= most
+         if (.not. conclusive) exit
          allowed = 2.0_wp*allowed
       end do
       effort = sum(runners%effort)
@@ -230,15 +237,22 @@ contains
          if (runners(2)%reached - t < 3.0_wp*quiet_after .and. .not. runners(2)%failed) forecast(2) = min(forecast(2), expected(2))
       end subroutine follow_collocation
 
-      !> Whether the trial has had its share of the run. One that may still become unstable has to show its whole run.
+      !> Whether the trial has had its share of the run, or would have with another round. One that may still become unstable
+      !> has to show its whole run.
       logical function is_spent()
          real(wp) :: budget, share
          budget = min(most_effort(motion%dynamics%scene), even_share*minval(forecast(:n_even)))
          share = own_share
          if (candidates(best)%order == 2 .and. runners(best)%growth > 1.4_wp) share = growing_share
          if (forecast(best) < minval(forecast(:n_even)) .and. .not. order_is_risky(best)) budget = min(budget, share*forecast(best))
-         is_spent = allowed >= budget
+         is_spent = allowed >= budget .or. after_next_round() > most_share*minval(forecast(:n_even))
       end function is_spent
+
+      !> Effort of the trial with another round, which doubles what implicit methods have spent.
+      real(wp) function after_next_round()
+         integer :: j
+         after_next_round = sum(runners%effort) + allowed*count([(.not. outdone(j), j=n_even + 1, size(candidates))])
+      end function after_next_round
 
       !> Sharpen the forecasts of the even methods that may be the best, if that is not settled and they are worth it.
       subroutine try_even()
@@ -441,7 +455,7 @@ contains
       do while (.not. self%failed .and. self%reached < t_end .and. self%effort - self%begun < 0.9_wp*allowed)
          stats = self%integrator%statistics()
          steps = max(5, int(min(allowed - (self%effort - self%begun), allowed/n_slices)/per_step(self)))
-         self%integrator%options%max_steps = int(stats%n_steps) + steps
+         self%integrator%options%max_steps = int(min(stats%n_steps + steps, int(huge(steps), i8)))
          call self%integrator%advance(t_end, state, self%reached, error)
          stats = self%integrator%statistics()
          self%effort = effort_of(candidate%method, motion%dynamics%scene, stats)
