@@ -26,6 +26,7 @@ module rodyn_driver
    real(wp), parameter :: trial_share = 0.3_wp    !! of the run that later trials may cost together, beside
    real(wp), parameter :: effort_of_rates = 300.0_wp !! of a choice beside its trial
    real(wp), parameter :: trials_free = 3000.0_wp !! right-hand sides
+   real(wp), parameter :: clear_advantage = 3.0_wp !! over explicit steps, from where an implicit method is far ahead
    integer, parameter :: watch_steps = 200        !! of BDF, after which its pace is judged
    integer, parameter :: most_verdicts = 64       !! that are remembered
    integer, parameter :: most_lines = 12          !! of the history
@@ -42,6 +43,7 @@ module rodyn_driver
       integer :: member = 0
       character(len=:), allocatable :: reason
       real(wp) :: pace = 0.0_wp       !! of the best even method [s]
+      logical :: clear = .false.      !! an implicit method that left explicit steps far behind
    end type verdict_type
 
    !> All methods together, to those who run them an integrator like others.
@@ -150,8 +152,8 @@ contains
       out = self%members%gave_up
       call choose_method(choice, self%options, motion, y(:motion%n_controlled), t, t_until, &
                          nint(self%n_outputs*((t_until - t)/self%t_end)), out, most_trial(self), self%monitor)
+      if (self%n_choices > 0) self%tried = self%tried + choice%effort + effort_of_rates
       self%n_choices = self%n_choices + 1
-      self%tried = self%tried + choice%effort + effort_of_rates
       self%on_probation = .not. choice%conclusive
       if (self%on_probation) self%next_choice = 2.0_wp*effort_of_run(self)
       member = findloc(self%members%gave_up, .false., dim=1)
@@ -162,7 +164,8 @@ contains
       self%pace = 0.0_wp
       if (self%on_probation) return
       verdict = verdict_type(laws_of(motion), member, choice%reason(), &
-                             merge(choice%pace, 0.0_wp, choice%tried .and. member > n_even))
+                             merge(choice%pace, 0.0_wp, choice%tried .and. member > n_even), &
+                             member > n_even .and. choice%advantage > clear_advantage)
       self%pace = verdict%pace
       i = place_of(self, verdict%laws)
       if (i > 0) then
@@ -276,7 +279,8 @@ contains
       member = self%verdicts(known)%member
    end subroutine follow
 
-   !> Choose anew, at the last good state.
+   !> Choose anew, at the last good state. Where a trial tells nothing, an implicit method that was far ahead the last time is
+   !> taken again; its pace is watched.
    subroutine judge_here(self, member)
       type(driver_type), intent(inout) :: self
       integer, intent(out) :: member
@@ -284,8 +288,17 @@ contains
 
       call judge(self, self%motion, self%t_last, self%y_last, choice, member)
       self%why = choice%reason()
-      if (.not. choice%conclusive) self%why = 'explicit steps, until a trial is worth its effort'
+      if (choice%conclusive) return
+      self%why = 'explicit steps, until a trial is worth its effort'
+      if (last_is_clear(self)) call follow(self, 1, member)
    end subroutine judge_here
+
+   !> Whether an implicit method was far ahead the last time, which is worth a try under other laws, too.
+   pure logical function last_is_clear(self)
+      type(driver_type), intent(in) :: self
+      last_is_clear = size(self%verdicts) > 0
+      if (last_is_clear) last_is_clear = self%verdicts(1)%clear .and. .not. self%members(self%verdicts(1)%member)%gave_up
+   end function last_is_clear
 
    !> One more line of the history.
    subroutine tell(self, line)
@@ -444,6 +457,8 @@ contains
          known = known_verdict(self)
          if (known > 0) then
             call follow(self, known, member)
+         else if (last_is_clear(self)) then
+            call follow(self, 1, member)
          else if (effort >= probation .and. may_choose(self)) then
             call judge_here(self, member)
          end if
