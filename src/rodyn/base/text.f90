@@ -6,7 +6,7 @@ module rodyn_text
    private
    public :: lower, is_name, is_digit
    public :: to_text, formatted, tidy, short_text, quoted, printable, as_utf8, ends_with
-   public :: edit_distance, word_count, word
+   public :: edit_distance, word_count, has_word, word
 
    !> A number as the shortest text (integer), or with 17 significant digits (real), or as T or F.
    interface to_text
@@ -158,6 +158,21 @@ contains
       word_count = 0
       if (len_trim(list) > 0) word_count = 1 + count([(list(i:i) == '|', i=1, len(list))])
    end function word_count
+
+   !> Is a word in a list such as 'free|fixed'?
+   pure logical function has_word(list, text)
+      character(len=*), intent(in) :: list, text
+      integer :: first, length
+
+      first = 1
+      do
+         length = index(list(first:), '|') - 1
+         if (length < 0) length = len_trim(list(first:))
+         has_word = list(first:first + length - 1) == text
+         first = first + length + 1
+         if (has_word .or. first > len_trim(list)) return
+      end do
+   end function has_word
 
    !> Word `k` of a list such as 'free|fixed'.
    pure function word(list, k) result(text)

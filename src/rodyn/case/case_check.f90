@@ -5,7 +5,7 @@ module rodyn_case_check
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: case_config, hinge_config, kink_config, load_config, model_config, profile_config, name_length, &
       none_given
-   use rodyn_case_fields, only: visit_case, law_takes, kink_law_takes
+   use rodyn_case_fields, only: visit_case, keys_of_law, keys_of_kink_law
    use rodyn_case_rules, only: check_case
    use rodyn_case_schema, only: case_extents, case_rows
    use rodyn_case_values, only: list_text, plain_text, value_shown
@@ -14,7 +14,7 @@ module rodyn_case_check
    use rodyn_field_visitor, only: field_visitor
    use rodyn_key_judge, only: key_judge
    use rodyn_schema, only: any_list, requirement, row_index, rule_text, satisfies, schema_extent, up_to, count_rule
-   use rodyn_text, only: printable, quoted, to_text, word, word_count
+   use rodyn_text, only: has_word, printable, quoted, to_text
    implicit none (type, external)
    private
    public :: sound_case, complete_case
@@ -193,9 +193,11 @@ contains
       case ('t_end')
          given = .not. is_none(load%t_end)
       case ('value')
-         given = law_takes(load%law, key) .or. .not. is_unset(load%value)
+         given = .not. is_unset(load%value)
+         if (.not. given) given = has_word(keys_of_law(load%law), key)
       case ('rate')
-         given = law_takes(load%law, key) .or. .not. is_unset(load%rate)
+         given = .not. is_unset(load%rate)
+         if (.not. given) given = has_word(keys_of_law(load%law), key)
       case ('rise_time')
          given = .not. is_unset(load%rise_time)
       case ('times')
@@ -220,9 +222,11 @@ contains
       case ('t_end')
          given = .not. is_none(program%t_end)
       case ('value')
-         given = kink_law_takes(program%law, key) .or. .not. is_unset(program%value)
+         given = .not. is_unset(program%value)
+         if (.not. given) given = has_word(keys_of_kink_law(program%law), key)
       case ('rate')
-         given = kink_law_takes(program%law, key) .or. .not. is_unset(program%rate)
+         given = .not. is_unset(program%rate)
+         if (.not. given) given = has_word(keys_of_kink_law(program%law), key)
       case ('times')
          given = has_values(program%times)
       case ('values')
@@ -305,12 +309,17 @@ contains
 
       self%group = group
       self%instance = instance
-      r = min(self%row + 1, size(case_rows))
-      if (case_rows(r)%group /= group .or. case_rows(max(1, self%row))%group == group) then
-         do r = 1, size(case_rows)
+      r = max(1, self%row) ! of the same group, if there are several, or of one before it
+      do
+         if (case_rows(r)%group(1:1) == group(1:1)) then ! cheap, and false of most
             if (case_rows(r)%group == group) exit
-         end do
-      end if
+         end if
+         r = r + 1
+      end do
+      do while (r > 1)
+         if (case_rows(r - 1)%group /= group) exit
+         r = r - 1
+      end do
       self%row = r - 1
    end subroutine open_group
 
@@ -382,8 +391,10 @@ contains
       associate (row => case_rows(self%row))
          lower = 1
          if (row%extent /= any_list) lower = self%extents(row%extent)%lower
-         if (has_values(x) .and. row%default == 'depends' .and. row%extent /= any_list) then
-            if (all(is_unset(x))) deallocate (x) ! stiffnesses of rigid rods
+         if (has_values(x) .and. row%extent /= any_list) then
+            if (all(is_unset(x))) then ! stiffnesses of rigid rods
+               if (row%default == 'depends') deallocate (x)
+            end if
          end if
          if (.not. has_values(x)) then
             call leave_out(self, x)
@@ -487,15 +498,10 @@ contains
       class(value_checker), intent(inout) :: self
       character(len=*), intent(in) :: key
       character(len=name_length), intent(inout) :: x
-      integer :: k
 
       call find(self, key)
-      associate (words => case_rows(self%row)%words)
-         do k = 1, word_count(words)
-            if (x == word(words, k)) return
-         end do
-      end associate
-      call reject(self, '', ' = '//printable(quoted(trim(x)), 60), requirement(case_rows(self%row)))
+      if (.not. has_word(case_rows(self%row)%words, x)) &
+         call reject(self, '', ' = '//printable(quoted(trim(x)), 60), requirement(case_rows(self%row)))
    end subroutine word_field
 
    subroutine text_field(self, key, x)

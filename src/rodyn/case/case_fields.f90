@@ -3,9 +3,10 @@ module rodyn_case_fields
    use rodyn_case_config, only: case_config, chain_config, hinge_config, initial_config, kink_config, load_config, &
       model_config, output_config, profile_config, solver_config, spacecraft_config
    use rodyn_field_visitor, only: field_visitor
+   use rodyn_text, only: has_word
    implicit none (type, external)
    private
-   public :: visit_case, law_takes, kink_law_takes
+   public :: visit_case, keys_of_law, keys_of_kink_law
 
 contains
 
@@ -122,19 +123,21 @@ contains
       class(field_visitor), intent(inout) :: visitor
       integer, intent(in) :: instance
       type(load_config), intent(inout) :: load
+      character(len=:), allocatable :: keys
       call visitor%open_group('load', instance)
       call visitor%word_field('target', load%target)
       if (visitor%every_key .or. load%target == 'node') call visitor%field('node', load%node)
       call visitor%word_field('component', load%component)
       call visitor%word_field('law', load%law)
+      keys = keys_of_law(load%law) ! a reader has just read it
       call visitor%field('t_start', load%t_start)
       call visitor%field('t_end', load%t_end)
-      if (visitor%every_key .or. law_takes(load%law, 'value')) call visitor%field('value', load%value)
-      if (visitor%every_key .or. law_takes(load%law, 'rate')) call visitor%field('rate', load%rate)
-      if (visitor%every_key .or. law_takes(load%law, 'rise_time')) call visitor%field('rise_time', load%rise_time)
-      if (visitor%every_key .or. law_takes(load%law, 'times')) call visitor%field('times', load%times)
-      if (visitor%every_key .or. law_takes(load%law, 'values')) call visitor%field('values', load%values)
-      if (visitor%every_key .or. law_takes(load%law, 'after')) call visitor%word_field('after', load%after)
+      if (visitor%every_key .or. has_word(keys, 'value')) call visitor%field('value', load%value)
+      if (visitor%every_key .or. has_word(keys, 'rate')) call visitor%field('rate', load%rate)
+      if (visitor%every_key .or. has_word(keys, 'rise_time')) call visitor%field('rise_time', load%rise_time)
+      if (visitor%every_key .or. has_word(keys, 'times')) call visitor%field('times', load%times)
+      if (visitor%every_key .or. has_word(keys, 'values')) call visitor%field('values', load%values)
+      if (visitor%every_key .or. has_word(keys, 'after')) call visitor%word_field('after', load%after)
       call visitor%close_group()
    end subroutine visit_load
 
@@ -143,15 +146,17 @@ contains
       class(field_visitor), intent(inout) :: visitor
       integer, intent(in) :: instance
       type(kink_config), intent(inout) :: program
+      character(len=:), allocatable :: keys
       call visitor%open_group('kink_program', instance)
       call visitor%field('hinge', program%hinge)
       call visitor%word_field('law', program%law)
-      if (visitor%every_key .or. kink_law_takes(program%law, 't_start')) call visitor%field('t_start', program%t_start)
-      if (visitor%every_key .or. kink_law_takes(program%law, 't_end')) call visitor%field('t_end', program%t_end)
-      if (visitor%every_key .or. kink_law_takes(program%law, 'value')) call visitor%field('value', program%value)
-      if (visitor%every_key .or. kink_law_takes(program%law, 'rate')) call visitor%field('rate', program%rate)
-      if (visitor%every_key .or. kink_law_takes(program%law, 'times')) call visitor%field('times', program%times)
-      if (visitor%every_key .or. kink_law_takes(program%law, 'values')) call visitor%field('values', program%values)
+      keys = keys_of_kink_law(program%law)
+      if (visitor%every_key .or. has_word(keys, 't_start')) call visitor%field('t_start', program%t_start)
+      if (visitor%every_key .or. has_word(keys, 't_end')) call visitor%field('t_end', program%t_end)
+      if (visitor%every_key .or. has_word(keys, 'value')) call visitor%field('value', program%value)
+      if (visitor%every_key .or. has_word(keys, 'rate')) call visitor%field('rate', program%rate)
+      if (visitor%every_key .or. has_word(keys, 'times')) call visitor%field('times', program%times)
+      if (visitor%every_key .or. has_word(keys, 'values')) call visitor%field('values', program%values)
       call visitor%close_group()
    end subroutine visit_kink_program
 
@@ -205,34 +210,36 @@ contains
       call visitor%close_group()
    end subroutine visit_output
 
-   !> Which of the keys value, rate, rise_time, times, values and after a law has.
-   pure logical function law_takes(law, key)
-      character(len=*), intent(in) :: law, key
+   !> Those of the keys value, rate, rise_time, times, values and after that the law of a load takes.
+   pure function keys_of_law(law) result(keys)
+      character(len=*), intent(in) :: law
+      character(len=:), allocatable :: keys !! a list such as 'value|rate'
       select case (law)
       case ('constant')
-         law_takes = key == 'value'
+         keys = 'value'
       case ('sine_squared')
-         law_takes = key == 'value' .or. key == 'rate'
+         keys = 'value|rate'
       case ('smooth_step')
-         law_takes = key == 'value' .or. key == 'rise_time'
+         keys = 'value|rise_time'
       case ('table')
-         law_takes = key == 'times' .or. key == 'values' .or. key == 'after'
+         keys = 'times|values|after'
       case default
-         law_takes = .false.
+         keys = ''
       end select
-   end function law_takes
+   end function keys_of_law
 
-   !> Which of the keys t_start, t_end, value, rate, times and values a kink's law has.
-   pure logical function kink_law_takes(law, key)
-      character(len=*), intent(in) :: law, key
-      select case (key)
-      case ('times', 'values')
-         kink_law_takes = law == 'table'
-      case ('rate')
-         kink_law_takes = law == 'sine'
+   !> Those of the keys t_start, t_end, value, rate, times and values that a kink's law takes.
+   pure function keys_of_kink_law(law) result(keys)
+      character(len=*), intent(in) :: law
+      character(len=:), allocatable :: keys
+      select case (law)
+      case ('table')
+         keys = 'times|values'
+      case ('sine')
+         keys = 't_start|t_end|value|rate'
       case default
-         kink_law_takes = law /= 'table'
+         keys = 't_start|t_end|value'
       end select
-   end function kink_law_takes
+   end function keys_of_kink_law
 
 end module rodyn_case_fields

@@ -2,7 +2,7 @@
 module rodyn_case_rules
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: case_config, load_config, profile_config
-   use rodyn_case_fields, only: law_takes
+   use rodyn_case_fields, only: keys_of_law
    use rodyn_key_judge, only: key_judge, no_such
    use rodyn_hinge_rules, only: check_moving_hinges
    use rodyn_law_rules, only: check_law_keys, check_table
@@ -21,7 +21,7 @@ contains
    subroutine check_case(judge, config)
       class(key_judge), intent(inout) :: judge
       type(case_config), intent(in) :: config !! its lists are allocated
-      integer :: i, k
+      integer :: i
 
       call check_spacecraft(judge, config)
       call check_model(judge, config)
@@ -35,8 +35,7 @@ contains
       do i = 1, size(config%loads)
          call check_target(judge, i, config%loads(i), config%chain%n_rods)
          associate (law => config%loads(i)%law)
-            call check_law_keys(judge, 'load', i, law, law_keys, [(law_takes(law, trim(law_keys(k))), k=1, size(law_keys))], &
-                                law_keys /= 'rise_time' .and. law_keys /= 'after')
+            call check_law_keys(judge, 'load', i, law, law_keys, keys_of_law(law), 'rise_time|after')
          end associate
          call check_times(judge, i, config%loads(i))
          if (config%loads(i)%law == 'table') call check_table(judge, 'load', i, config%loads(i)%times, &

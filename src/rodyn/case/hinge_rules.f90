@@ -2,7 +2,7 @@
 module rodyn_hinge_rules
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: case_config, hinge_config, kink_config, none_given
-   use rodyn_case_fields, only: kink_law_takes
+   use rodyn_case_fields, only: keys_of_kink_law
    use rodyn_key_judge, only: key_judge, no_such
    use rodyn_law_rules, only: check_law_keys, check_table
    use rodyn_switch_times, only: same_time
@@ -18,14 +18,12 @@ contains
    subroutine check_moving_hinges(judge, config)
       class(key_judge), intent(inout) :: judge
       type(case_config), intent(in) :: config
-      integer :: i, k
+      integer :: i
 
       do i = 1, size(config%kink_programs)
          call check_exists(judge, 'kink_program', i, config%kink_programs(i)%hinge, config%chain%n_rods)
          associate (law => config%kink_programs(i)%law)
-            call check_law_keys(judge, 'kink_program', i, law, law_keys, &
-                                [(kink_law_takes(law, trim(law_keys(k))), k=1, size(law_keys))], &
-                                law_keys /= 't_start' .and. law_keys /= 't_end')
+            call check_law_keys(judge, 'kink_program', i, law, law_keys, keys_of_kink_law(law), 't_start|t_end')
          end associate
          call check_program_times(judge, i, config%kink_programs(i))
          call check_jumps(judge, i, config%kink_programs(i), config)

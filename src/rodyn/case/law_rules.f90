@@ -3,7 +3,7 @@ module rodyn_law_rules
    use rodyn_kinds, only: wp
    use rodyn_key_judge, only: key_judge
    use rodyn_switch_times, only: same_time
-   use rodyn_text, only: short_text, to_text
+   use rodyn_text, only: has_word, short_text, to_text
    implicit none (type, external)
    private
    public :: check_law_keys, check_table
@@ -11,24 +11,26 @@ module rodyn_law_rules
 contains
 
    !> Each law has its own keys and takes no others.
-   subroutine check_law_keys(judge, group, i, law, keys, takes, needs)
+   subroutine check_law_keys(judge, group, i, law, keys, takes, defaults)
       class(key_judge), intent(inout) :: judge
       character(len=*), intent(in) :: group
       integer, intent(in) :: i !! which of these groups
       character(len=*), intent(in) :: law
       character(len=*), intent(in) :: keys(:)
-      logical, intent(in) :: takes(:), needs(:) !! does the law take the key, and has it no default?
-      character(len=:), allocatable :: key, named
+      character(len=*), intent(in) :: takes    !! keys that the law takes, a list such as 'value|rate'
+      character(len=*), intent(in) :: defaults !! those of them that need not be given
+      logical :: taken
       integer :: k
 
       if (.not. judge%is_sound(group, i, 'law')) return
-      named = "law = '"//trim(law)//"'"
       do k = 1, size(keys)
-         key = trim(keys(k))
-         if (.not. takes(k)) then
-            if (judge%is_given(group, i, key)) call judge%blame(group, i, key, 'does not go with '//named)
-         else if (needs(k)) then
-            call judge%require(group, i, key, 'when '//named)
+         taken = has_word(takes, keys(k))
+         if (taken .and. has_word(defaults, keys(k))) cycle
+         if (judge%is_given(group, i, trim(keys(k))) .eqv. taken) cycle
+         if (taken) then
+            call judge%require(group, i, trim(keys(k)), "when law = '"//trim(law)//"'")
+         else
+            call judge%blame(group, i, trim(keys(k)), "does not go with law = '"//trim(law)//"'")
          end if
       end do
    end subroutine check_law_keys
