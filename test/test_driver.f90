@@ -60,6 +60,19 @@ module test_driver
       '&initial phi = 0.5, 0.1 /'//nl// &
       '&hinge hinge = 0, lower_stop = -0.01, upper_stop = 0.02, stop_stiffness = 3e4 /'//nl// &
       '&hinge hinge = 1, lower_stop = -0.02, upper_stop = 0.01, stop_stiffness = 3e4 /'//nl
+   character(len=*), parameter :: released_and_latched = '&case t_end = 1 /'//nl// &
+      '&spacecraft mass = 150, inertia = 150, hinge_x = 0.5 /'//nl// &
+      '&chain n_rods = 1, length = 1, mass_per_length = 2, bending_stiffness = 3e4, hinge_stiffness = 50 /'//nl// &
+      '&hinge hinge = 0, held = .true., release_time = 0.1, rest_angle = 0.2, latch_angle = 0.1 /'//nl
+   character(len=*), parameter :: in_sequence = '&case t_end = 2.0 /'//nl// &
+      '&spacecraft mass = 420.0, inertia = 190.0, hinge_x = 1.4, hinge_y = -0.73 /'//nl// &
+      '&chain n_rods = 3, length = 3*1.2, mass_per_length = 0.53, 2.2, 0.95, bending_stiffness = 3*1100.0, '// &
+      'node_mass = 3*0.28, hinge_stiffness = 3*7.3 /'//nl// &
+      '&initial phi = 1.1, -0.88, 0.88 /'//nl// &
+      '&hinge hinge = 0, held = .true., rest_angle = -0.13, latch_angle = 0.0, release_time = 0.1, friction_moment = 2.1, '// &
+      'friction_velocity = 0.01 /'//nl// &
+      '&hinge hinge = 1, held = .true., rest_angle = 0.32, latch_angle = 0.0, release_after = 0 /'//nl// &
+      '&hinge hinge = 2, held = .true., rest_angle = -0.18, latch_angle = 0.0, release_after = 1 /'//nl
 
 contains
 
@@ -71,7 +84,10 @@ contains
                new_test('max_steps counts the steps of all methods', test_max_steps), &
                new_test('a chain that is released later is judged as it will be', test_release), &
                new_test('a chain that latches is judged anew', test_latch), &
-               new_test('events in numbers do not make choices in numbers', test_many_events)]
+               new_test('events in numbers do not make choices in numbers', test_many_events), &
+               new_test('every change of the method is told', test_told), &
+               new_test('a method that gave up is not taken again where it was chosen before', test_left_for_good), &
+               new_test('trials after releases cost less than the run', test_trials_after_releases)]
    end subroutine collect_driver
 
    !> The article's chain, shorter: collocation is the choice.
@@ -185,6 +201,46 @@ contains
       call check(error, run%motion%events%n_logged > 200, 'too few events')
       if (.not. allocated(error)) call check(error, run%driver%n_choices <= 6, 'choices in numbers')
    end subroutine test_many_events
+
+   !> Held, free, and latched: collocation, explicit steps, and what was chosen at the start.
+   subroutine test_told(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(run_type) :: run
+      character(len=:), allocatable :: told
+      call prepare(run, released_and_latched, error)
+      if (.not. allocated(error)) call perform(run, error)
+      if (allocated(error)) return
+      told = run%driver%reason()
+      call check(error, index(told, 'auto: ') == 1 .and. index(told, ': collocation') > 0 .and. &
+                 index(told, nl//'from t = 0.1 s dop853: ') > 0 .and. index(told, ' s gauss: auto: ', back=.true.) > &
+                 index(told, ' s dop853: ', back=.true.), told)
+   end subroutine test_told
+
+   subroutine test_left_for_good(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(run_type) :: run
+      type(solver_statistics) :: stats
+      call prepare(run, released_and_latched, error)
+      if (allocated(error)) return
+      run%driver%members(2)%gave_up = .true.
+      call perform(run, error)
+      if (allocated(error)) return
+      stats = run%driver%members(2)%integrator%statistics()
+      call check(error, run%motion%events%n_logged == 2 .and. stats%n_starts == 1 .and. &
+                 index(run%driver%reason(), ' s gauss: ') == 0, run%driver%reason())
+   end subroutine test_left_for_good
+
+   !> Dampers of friction let implicit methods seem the better ones for long.
+   subroutine test_trials_after_releases(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(run_type) :: run
+      real(wp) :: effort
+      call prepare(run, in_sequence, error)
+      if (.not. allocated(error)) call perform(run, error)
+      if (allocated(error)) return
+      effort = effort_of('dop853', run%scene, run%driver%statistics())
+      call check(error, run%driver%n_choices > 1 .and. run%driver%tried < 0.5_wp*effort, 'trials cost too much')
+   end subroutine test_trials_after_releases
 
    !> Effort of a run.
    subroutine measure(text, method, effort, error)

@@ -18,7 +18,8 @@ outputs. What is wrong is one of:
 - slow: `auto` takes more than 2.5 times the user time of the quickest method within the bound.
 
 Some motions are sensitive: from the time where a neighbour, whose angles start 1e-9 rad apart, is more than 100 times as far away,
-nothing is compared, and events after it are not counted.
+nothing is compared, and events after it are not counted. Where events of a run differ, neighbours as far apart as the bound of that
+run are asked, too: what differs between these is not determined by the tolerance.
 """
 
 from __future__ import annotations
@@ -152,6 +153,10 @@ class Reference:
         self.energy = float(sum(abs(self.motion.states[name]).max() for name in ENERGIES)) if self.rows else 0.0
         self._sensitive: float | None = None
 
+    def undetermined_from(self, bound: float) -> float:
+        """The time of the first event that differs between neighbours so far apart [rad]; twice the end: none."""
+        return min(first_difference(motion_of(self.groups, shift).events, self.motion.events, self.t_end) for shift in (bound, -bound))
+
     def sensitive_from(self) -> float:
         """The time where a neighbour is too far away; twice the end: never."""
         if self._sensitive is None:
@@ -208,6 +213,9 @@ def judged(run: Run, keys: dict, reference: Reference) -> dict:
     wrong = phi.max() > FACTOR or energy.max() > ENERGY or differ <= reference.t_end
     if wrong:
         until = reference.sensitive_from()
+        if differ <= min(until * 0.999999, reference.t_end):
+            undetermined = reference.undetermined_from(FACTOR * float(f"{bound:.3g}"))
+            differ = differ if differ < 0.999 * undetermined else 2.0 * reference.t_end
         keep = reference.motion.time[rows] <= until
     return {"phi": float(phi[keep].max()), "energy": float(energy[keep].max()), "events": bool(differ <= min(until * 0.999999, reference.t_end)),
             "until": until if until <= reference.t_end else None, "differ": differ if differ <= reference.t_end else None}

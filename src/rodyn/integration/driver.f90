@@ -68,7 +68,7 @@ module rodyn_driver
       real(wp), private :: effort_window = 0.0_wp    !! of the member at work at that time
       real(wp), private :: effort_begun = 0.0_wp     !! likewise, when it was put to work
       real(wp), private :: spent = 0.0_wp            !! effort of the run until then
-      real(wp), private :: tried = 0.0_wp            !! effort of choices
+      real(wp) :: tried = 0.0_wp                     !! effort of later choices
       real(wp), private :: next_choice = 0.0_wp      !! effort of the run before which none is made
       real(wp), private :: t_last = 0.0_wp           !! the last good state [s]
       real(wp), allocatable, private :: y_last(:)    !! (n_states)
