@@ -1,10 +1,18 @@
 !> Work and dissipated energy, against values by hand, for every method and tolerance.
 module test_ledger
-   use rodyn_kinds, only: wp
-   use rodyn_errors, only: error_type
-   use rodyn_ode, only: n_quadratures
+   use rodyn_kinds, only: wp, i8
+   use rodyn_errors, only: error_type, exit_stopped
+   use rodyn_lanes, only: lanes
+   use rodyn_ode, only: ode_system, n_quadratures
    use rodyn_quadrature_history, only: quadrature_history
    use rodyn_case_config, only: case_config, hinge_config, kink_config, load_config
+   use rodyn_case_reader, only: parse_case
+   use rodyn_scene, only: scene_type, new_scene
+   use rodyn_motion, only: motion_type, new_motion, initial_state
+   use rodyn_integrator, only: integrator_type, monitor_type, solver_options
+   use rodyn_integrators, only: new_integrator
+   use rodyn_run_file, only: new_run_row
+   use rodyn_simulation, only: listed_times, simulate
    use test_testing, only: unittest, new_test, check
    use test_random_scenes, only: allocate_case
    use test_trajectories, only: trajectory, integrate
@@ -15,6 +23,32 @@ module test_ledger
    character(len=6), parameter :: methods(5) = [character(len=6) :: 'adams', 'bdf', 'erk', 'dop853', 'gauss']
    real(wp), parameter :: bound = 50.0_wp !! of errors, in rtol times the energy of the run
 
+   !> A motion that counts its evaluations, and whose powers may fail.
+   type, extends(motion_type) :: watched_motion
+      integer :: n_calls = 0
+      real(wp) :: t_refuse = huge(1.0_wp) !! powers cannot be evaluated from then on [s]
+   contains
+      procedure :: rhs => watched_rhs
+      procedure :: lane_accelerations => watched_lanes
+      procedure :: quadratures => watched_quadratures
+   end type watched_motion
+
+   !> A motion that is easy to follow, whose powers are noise from some time on, and who watches it and wants to stop then.
+   type, extends(ode_system) :: noisy_system
+      real(wp) :: t_noise = 1.0_wp !! [s]
+      integer :: n_noisy = 0       !! evaluations since then
+   contains
+      procedure :: rhs => noisy_rhs
+      procedure :: jacobian => noisy_jacobian
+   end type noisy_system
+
+   type, extends(monitor_type) :: patient_monitor
+      type(noisy_system), pointer :: system => null()
+   contains
+      procedure :: report => no_report
+      procedure :: stop_requested => wants_to_stop
+   end type patient_monitor
+
 contains
 
    subroutine collect_ledger(suite)
@@ -24,7 +58,10 @@ contains
                new_test('work of a load is the kinetic energy of a free body', test_free_body), &
                new_test('a hinge that is held passes the work of its kink', test_held_kink), &
                new_test('rates of past steps integrate polynomials exactly and a vibration to their tolerance', test_history), &
-               new_test('a peak within one step is seen beside a smooth past', test_peak)]
+               new_test('a peak within one step is seen beside a smooth past', test_peak), &
+               new_test('from rest, a ledger does not chase rounding', test_from_rest), &
+               new_test('powers that cannot be evaluated end a run', test_failing_powers), &
+               new_test('a request to stop is heeded soon where powers are noise', test_stop_in_noise)]
    end subroutine collect_ledger
 
    !> One rigid rod on a fixed spacecraft, of length 1.
@@ -245,5 +282,190 @@ contains
          end do
       end do
    end subroutine test_peak
+
+   !> Chains at rest until a kink, of a spline through a table, or a load sets them in motion.
+   function from_rest(which) result(text)
+      integer, intent(in) :: which
+      character(len=:), allocatable :: text
+      if (which == 1) then
+         text = "&case t_end = 0.31, n_outputs = 1 / "// &
+                "&spacecraft mass = 82, inertia = 310, hinge_x = 0.2 / "// &
+                "&chain n_rods = 2, length = 2, mass_per_length = 2, bending_stiffness = 390, hinge_stiffness = 380 / "// &
+                "&kink_program hinge = 0, law = 'table', times = 0.3, 0.9, 1.5, values = 0, 0.21, 0.3 /"
+      else
+         text = "&case t_end = 0.5, n_outputs = 20 / "// &
+                "&spacecraft mass = 300, inertia = 80, hinge_x = 0.7 / "// &
+                "&chain n_rods = 1, length = 2, mass_per_length = 0.8, bending_stiffness = 2000, node_mass = 2, "// &
+                "hinge_stiffness = 1500 / "// &
+                "&load component = 'M', t_start = 0.25, t_end = 4, value = 20 /"
+      end if
+   end function from_rest
+
+   !> Run such a chain and count evaluations of its motion and of its powers.
+   subroutine watch(which, method, ledger, t_refuse, n_calls, error)
+      integer, intent(in) :: which
+      character(len=*), intent(in) :: method
+      logical, intent(in) :: ledger
+      real(wp), intent(in) :: t_refuse !! [s]
+      integer, intent(out) :: n_calls
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+      type(scene_type) :: scene
+      type(watched_motion), target :: motion
+      class(integrator_type), allocatable :: integrator
+      type(trajectory) :: result
+      real(wp), allocatable :: y(:)
+      real(wp) :: t
+
+      n_calls = 0
+      call parse_case(from_rest(which), 'from rest', config, error)
+      if (.not. allocated(error)) call new_scene(scene, config, error)
+      if (.not. allocated(error)) call new_motion(motion%motion_type, scene, ledger, error)
+      if (allocated(error)) return
+      motion%t_refuse = t_refuse
+      call initial_state(motion%motion_type, config%initial, y)
+      call new_integrator(integrator, motion, method, solver_options(), error)
+      if (allocated(error)) return
+      result%rows = spread(new_run_row(scene%n), 1, 2)
+      call simulate(motion%motion_type, integrator, listed_times([0.0_wp, config%t_end]), config%t_end, result, y, t, error)
+      call integrator%finalize()
+      n_calls = motion%n_calls
+   end subroutine watch
+
+   !> Powers are rounding alone at first: of relative size one, which no step is short enough for. With a tolerance that vanishes
+   !> with the energy, erk took 10 times the evaluations. CVODE takes two a step and five a panel where steps begin anew.
+   subroutine test_from_rest(error)
+      type(error_type), allocatable, intent(out) :: error
+      character(len=80) :: text
+      integer :: i, which, without, with
+
+      do which = 1, 2
+         do i = 1, size(methods)
+            call watch(which, trim(methods(i)), .false., huge(1.0_wp), without, error)
+            if (.not. allocated(error)) call watch(which, trim(methods(i)), .true., huge(1.0_wp), with, error)
+            if (allocated(error)) return
+            write (text, '(a, i0, a, i0, a)') trim(methods(i))//': ', with, ' evaluations with a ledger, ', without, ' without'
+            call check(error, with <= 3*without, trim(text))
+            if (allocated(error)) return
+         end do
+      end do
+   end subroutine test_from_rest
+
+   !> Nothing may be summed up that was not computed. dop853 has its powers from the right-hand side; erk, but for the first one.
+   subroutine test_failing_powers(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable :: failure
+      real(wp), parameter :: start = 0.25_wp
+      integer :: i, n_calls
+
+      do i = 1, size(methods)
+         if (methods(i) == 'dop853') cycle
+         call watch(2, trim(methods(i)), .true., start + merge(0.0_wp, 0.01_wp, methods(i) == 'erk'), n_calls, failure)
+         call check(error, allocated(failure), trim(methods(i))//' does not notice')
+         if (allocated(error)) return
+      end do
+   end subroutine test_failing_powers
+
+   subroutine watched_rhs(self, t, y, ydot, ok)
+      class(watched_motion), intent(inout) :: self
+      real(wp), intent(in) :: t
+      real(wp), contiguous, intent(in) :: y(:)
+      real(wp), contiguous, intent(out) :: ydot(:)
+      logical, intent(out) :: ok
+      self%n_calls = self%n_calls + 1
+      call self%motion_type%rhs(t, y, ydot, ok)
+   end subroutine watched_rhs
+
+   subroutine watched_lanes(self, t, q, p, acceleration, ok)
+      class(watched_motion), intent(inout) :: self
+      real(wp), intent(in) :: t(lanes)
+      real(wp), contiguous, intent(in) :: q(:, :), p(:, :)
+      real(wp), contiguous, intent(out) :: acceleration(:, :)
+      logical, intent(out) :: ok
+      self%n_calls = self%n_calls + lanes
+      call self%motion_type%lane_accelerations(t, q, p, acceleration, ok)
+   end subroutine watched_lanes
+
+   subroutine watched_quadratures(self, t, y, rate, ok)
+      class(watched_motion), intent(inout) :: self
+      real(wp), intent(in) :: t
+      real(wp), contiguous, intent(in) :: y(:)
+      real(wp), intent(out) :: rate(n_quadratures)
+      logical, intent(out) :: ok
+      self%n_calls = self%n_calls + 1
+      call self%motion_type%quadratures(t, y, rate, ok)
+      ok = ok .and. t < self%t_refuse
+   end subroutine watched_quadratures
+
+   !> Steps are so fast at first that the monitor is asked once in thousands; then each takes hundreds of evaluations for powers.
+   !> If they counted as one step still, it would be asked after up to 4096 of them: two millions of evaluations.
+   subroutine test_stop_in_noise(error)
+      type(error_type), allocatable, intent(out) :: error
+      integer, parameter :: most = 80000 ! 4096 steps of 12 evaluations, and one step more, with room
+      character(len=*), parameter :: followers(*) = [character(len=6) :: 'adams', 'erk', 'dop853']
+      type(noisy_system), target :: system
+      type(patient_monitor), target :: monitor
+      class(integrator_type), allocatable :: integrator
+      type(error_type), allocatable :: failure
+      character(len=80) :: text
+      real(wp) :: y(1 + n_quadratures), t
+      integer :: i
+
+      do i = 1, size(followers)
+         system = noisy_system(n_states=1 + n_quadratures, n_controlled=1)
+         monitor%system => system
+         call new_integrator(integrator, system, trim(followers(i)), solver_options(max_step=2.0e-5_wp), error)
+         if (allocated(error)) return
+         call integrator%set_monitor(monitor)
+         call integrator%set_stop(2.0_wp)
+         call integrator%start(0.0_wp, [1.0_wp, 0.0_wp, 0.0_wp], error)
+         if (allocated(error)) return
+         call integrator%advance(2.0_wp, y, t, failure)
+         call integrator%finalize()
+         call check(error, allocated(failure), trim(followers(i))//': not stopped')
+         if (allocated(error)) return
+         write (text, '(a, i0, a)') trim(followers(i))//': stopped after ', system%n_noisy, ' evaluations'
+         call check(error, failure%exit_code == exit_stopped .and. system%n_noisy <= most, trim(text))
+         if (allocated(error)) return
+      end do
+   end subroutine test_stop_in_noise
+
+   subroutine noisy_rhs(self, t, y, ydot, ok)
+      class(noisy_system), intent(inout) :: self
+      real(wp), intent(in) :: t
+      real(wp), contiguous, intent(in) :: y(:)
+      real(wp), contiguous, intent(out) :: ydot(:)
+      logical, intent(out) :: ok
+      ok = .true.
+      ydot(1) = -y(1)
+      if (size(ydot) == 1) return
+      ydot(2:) = 0.0_wp
+      if (t < self%t_noise) return
+      self%n_noisy = self%n_noisy + 1
+      ydot(2) = modulo(1.0e9_wp*sin(1.0e9_wp*t), 1.0_wp)
+   end subroutine noisy_rhs
+
+   subroutine noisy_jacobian(self, t, y, jac, ok)
+      class(noisy_system), intent(inout) :: self
+      real(wp), intent(in) :: t
+      real(wp), contiguous, intent(in) :: y(:)
+      real(wp), contiguous, intent(out) :: jac(:, :)
+      logical, intent(out) :: ok
+      associate (unused => self, unused_t => t, unused_y => y); end associate
+      jac = -1.0_wp
+      ok = .true.
+   end subroutine noisy_jacobian
+
+   subroutine no_report(self, t, n_steps)
+      class(patient_monitor), intent(inout) :: self
+      real(wp), intent(in) :: t
+      integer(i8), intent(in) :: n_steps
+      associate (unused => self, unused_t => t, unused_n => n_steps); end associate
+   end subroutine no_report
+
+   logical function wants_to_stop(self)
+      class(patient_monitor), intent(in) :: self
+      wants_to_stop = self%system%n_noisy > 0
+   end function wants_to_stop
 
 end module test_ledger

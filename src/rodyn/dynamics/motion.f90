@@ -321,7 +321,7 @@ contains
       associate (hinges => self%dynamics%scene%hinges, r => self%n_q, m => self%n_dof)
          if (.not. (hinges%driven .or. self%events%watches)) then
             call self%dynamics%set_regime(t, t_to)
-            if (self%ledger .and. .not. t > 0.0_wp) call self%begin_quadratures(energy_of(self, y))
+            if (self%ledger .and. .not. t > 0.0_wp) call begin_ledger(self, y)
             return
          end if
          if (t > 0.0_wp) then
@@ -339,11 +339,27 @@ contains
             call self%dynamics%set_regime(t, t_to)
             self%events%span = t_end
             if (self%events%watches) call self%events%begin(self%dynamics, y(1:r), y(r + 1:r + m), error)
-            if (self%ledger) call self%begin_quadratures(energy_of(self, y))
+            if (self%ledger) call begin_ledger(self, y)
          end if
       end associate
       call forget_hinges(self)
    end subroutine begin_regime
+
+   !> The control of errors compares with the energy at the start and with that of the chain, all of whose rods turn at 1 rad/s.
+   subroutine begin_ledger(self, y)
+      class(motion_type), intent(inout) :: self
+      real(wp), intent(in) :: y(:) !! (n_states)
+      type(invariants_type) :: values
+      real(wp) :: turning(size(y))
+
+      turning(:self%n_q) = y(:self%n_q)
+      turning(self%n_q + 1:) = 0.0_wp
+      associate (scene => self%dynamics%scene, first => self%n_q + self%dynamics%scene%phi_at() + 1)
+         turning(first:first + scene%n - 1) = 1.0_wp
+      end associate
+      values = state_invariants(self, turning)
+      call self%begin_quadratures(energy_of(self, y), values%kinetic)
+   end subroutine begin_ledger
 
    !> Kinetic and elastic energy [J].
    real(wp) function energy_of(self, y)

@@ -304,7 +304,7 @@ contains
          if (.not. allocated(error)) call rates_within(self, t_middle, middle, error)
          if (allocated(error)) return
          call self%history%add(t_middle, middle, self%t_good, self%rate)
-         tolerance = self%system%quadrature_tolerance(self%options%rtol, self%sums_before)
+         tolerance = self%system%quadrature_tolerance(self%options%rtol, self%options%atol, self%sums_before)
          call self%history%integrate(tolerance, increment, off, ok)
          if (.not. ok) call integrate_quadratures(self, self%t_good, self%rate, increment, off, error)
          if (allocated(error)) return
@@ -368,8 +368,10 @@ contains
          call integrate_panel(self, t, ends(depth), first, rates(:, depth), part, middle, off, error)
          if (allocated(error)) return
          panels = panels + 1
-         tolerance = max(self%system%quadrature_tolerance(self%options%rtol, self%sums_before + total + part), &
-                         8.0_wp*epsilon(1.0_wp)*(t_end - self%t_before)*maxval(abs(middle)))
+         associate (options => self%options)
+            tolerance = max(self%system%quadrature_tolerance(options%rtol, options%atol, self%sums_before + total + part), &
+                            8.0_wp*epsilon(1.0_wp)*(t_end - self%t_before)*maxval(abs(middle)))
+         end associate
          if (maxval(off) <= tolerance .or. depth == deepest .or. panels >= most) then
             total = total + part
             total_off = total_off + off
@@ -382,6 +384,7 @@ contains
             depth = depth + 1
          end if
       end do
+      call self%count_as_steps(panels)
    end subroutine integrate_quadratures
 
    !> Integral over a panel by the seven points of Kronrod's extension of Lobatto's rule of four (Gander & Gautschi, BIT 40,

@@ -147,16 +147,18 @@ contains
       real(wp), intent(in) :: t, h !! [s]
       real(wp), intent(in) :: y(:) !! at the start of the step
       real(wp) :: values(n_quadratures), tolerance
+      integer :: n_steps
       logical :: ok
 
       associate (m => self%system%n_controlled, options => self%options, error => self%quadrature_error)
          call quadrature_errors(m, h, self%k, error)
          if (self%n_grid > 0) return
          values = y(m + 1:) + self%increment(m + 1:)
-         tolerance = self%system%quadrature_tolerance(options%rtol, values)
+         tolerance = self%system%quadrature_tolerance(options%rtol, options%atol, values)
          if (maxval(error) <= tolerance) return
          call self%refinement%refine(self%system, t, y, t + h, options%rtol, options%atol, tolerance, &
-                                     self%increment(m + 1:), error, self%counts%n_rhs, ok)
+                                     self%increment(m + 1:), error, self%counts%n_rhs, n_steps, ok)
+         call self%count_as_steps(n_steps)
       end associate
    end subroutine control_quadratures
 

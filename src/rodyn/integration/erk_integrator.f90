@@ -135,7 +135,11 @@ contains
       self%stop_in_force = -huge(1.0_wp)
       if (self%system%n_events > 0) call begin_events(self, error)
       if (allocated(error)) return
-      if (self%system%has_quadratures()) call self%system%quadratures(t, self%y_good(:self%system%n_controlled), self%rate, ok)
+      if (self%system%has_quadratures()) then
+         call self%system%quadratures(t, self%y_good(:self%system%n_controlled), self%rate, ok)
+         if (.not. ok) call raise(error, 'start at t = '//time_text(t)//' s: work and dissipation cannot be evaluated')
+         if (allocated(error)) return
+      end if
       if (c_associated(self%memory)) then
          self%before_restart = self%statistics()
          call check(error, FERKStepReInit(self%memory, c_funloc(rhs_shim), t, self%state), 'ERKStepReInit', t)
@@ -407,6 +411,7 @@ contains
       real(wp), intent(inout) :: values(n_quadratures)
       real(wp), dimension(n_quadratures) :: before, integral
       real(wp) :: tolerance
+      integer :: n_steps
       logical :: ok
 
       associate (h => t - self%t_before, options => self%options)
@@ -414,10 +419,12 @@ contains
          integral = h*weighted(power, self%b)
          self%quadrature_error = h*estimate(self, power)
          if (.not. options%fixed_step > 0.0_wp) then
-            tolerance = self%system%quadrature_tolerance(options%rtol, before + integral)
-            if (maxval(self%quadrature_error) > tolerance) &
+            tolerance = self%system%quadrature_tolerance(options%rtol, options%atol, before + integral)
+            if (maxval(self%quadrature_error) > tolerance) then
                call self%refinement%refine(self%system, self%t_before, self%y_before, t, options%rtol, options%atol, tolerance, &
-                                           integral, self%quadrature_error, self%data%n_rhs, ok)
+                                           integral, self%quadrature_error, self%data%n_rhs, n_steps, ok)
+               call self%count_as_steps(n_steps)
+            end if
          end if
          values = before + integral
       end associate

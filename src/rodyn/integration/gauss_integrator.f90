@@ -43,6 +43,7 @@ module rodyn_gauss_integrator
    integer, parameter :: degree_interval = 16      !! steps after which the degree is judged again
    real(wp), parameter :: search_cost = 1.0_wp      !! finding modes, in iterations per unknown
    integer, parameter :: most_inner_steps = 8       !! to an output
+   character(len=*), parameter :: no_powers = 'work and dissipation cannot be evaluated'
 
    ! The numbers of the method, made once: a sweep has thousands of integrators.
    type(gauss_collocation) :: made_rule
@@ -81,7 +82,8 @@ module rodyn_gauss_integrator
       real(wp), allocatable :: node_state(:) !! workspace: (q, p) at one node
       real(wp) :: quadrature_error(n_quadratures) = 0.0_wp !! in the last step
       type(quadrature_refinement) :: refinement
-      logical :: refines = .true.            !! quadratures whose errors are too large
+      logical :: refines = .true.            !! quadratures whose errors are too large; if explicit steps once could not follow
+                                             !! what is stiff, they are not tried again before the next start
       real(wp), allocatable :: weight(:)     !! 1/tolerance of the rates (n_dof)
       real(wp), allocatable :: y(:), lost(:) !! state at t, and what rounding took from it (n_states)
       real(wp), allocatable :: y_before(:)   !! state at t_before
@@ -208,37 +210,44 @@ contains
       t = self%t
       y = self%y
       if (allocated(error) .or. t <= t_out) return
-      call inner_state(self, t_out, y)
-      t = t_out
+      call inner_state(self, t_out, y, error)
+      if (allocated(error)) then
+         y = self%y
+      else
+         t = t_out
+      end if
    end subroutine advance
 
    !> State inside the last step, by one shorter step from its start whose first guess is that step's own polynomial. Should its
    !> iteration not converge, by several steps; and if nothing helps, by the polynomial itself, which is of lower order.
-   subroutine inner_state(self, t_out, y)
+   subroutine inner_state(self, t_out, y, error)
       class(gauss_integrator), intent(inout) :: self
       real(wp), intent(in) :: t_out
       real(wp), contiguous, intent(out) :: y(:)
+      type(error_type), allocatable, intent(inout) :: error !! powers that cannot be evaluated
       integer :: n
       logical :: ok
 
       call swap_matrices(self%now, self%spare)
       n = 1
       do
-         call inner_steps(self, t_out - self%t_before, n, y, ok)
+         call inner_steps(self, t_out - self%t_before, n, .true., y, ok)
          if (ok .or. n >= most_inner_steps) exit
          n = 2*n
       end do
-      if (.not. ok) call inner_steps(self, t_out - self%t_before, 1, y)
+      if (.not. ok) call inner_steps(self, t_out - self%t_before, 1, .false., y, ok)
       call swap_matrices(self%now, self%spare)
+      if (.not. ok) call raise(error, 'gauss: output at t = '//time_text(t_out)//' s: '//no_powers)
    end subroutine inner_state
 
-   !> From the start of the last step over a time h in n equal steps; without `ok` their first guess is left as it is.
-   subroutine inner_steps(self, h, n, y, ok)
+   !> From the start of the last step over a time h in n equal steps.
+   subroutine inner_steps(self, h, n, iterated, y, ok)
       class(gauss_integrator), intent(inout) :: self
       real(wp), intent(in) :: h !! [s]
       integer, intent(in) :: n
+      logical, intent(in) :: iterated !! else their first guess is left as it is
       real(wp), contiguous, intent(out) :: y(:)
-      logical, intent(out), optional :: ok
+      logical, intent(out) :: ok
       real(wp) :: rates(2), t
       integer :: i
 
@@ -250,7 +259,8 @@ contains
          t = self%t_before + h*(real(i, wp)/n)
          call multiply(self%mechanics%n_dof, self%rule%interpolation((h*i)/(n*self%last%h), h/(n*self%last%h)), self%last%f, &
                        self%trial%f)
-         if (present(ok)) then
+         ok = .true.
+         if (iterated) then
             call set_weights(self, y)
             call iterate(self, t, y, ok)
             if (ok) ok = all(ieee_is_finite(self%trial%f))
@@ -259,7 +269,8 @@ contains
             call nodes_from(self, y)
          end if
          call form_increment(self, y)
-         if (self%system%has_quadratures()) call add_quadratures(self, t, y)
+         if (self%system%has_quadratures()) call add_quadratures(self, t, y, ok)
+         if (.not. ok) exit
          y = y + self%increment
       end do
       self%rate = rates(1)
@@ -322,7 +333,11 @@ contains
          end if
       end do
       if (modulo(self%n_steps, degree_interval) == 0) call choose_degree(self)
-      if (self%system%has_quadratures()) call add_quadratures(self, self%t, self%y)
+      if (self%system%has_quadratures()) call add_quadratures(self, self%t, self%y, ok)
+      if (.not. ok) then
+         call raise(error, 'gauss at t = '//time_text(self%t)//' s: '//no_powers)
+         return
+      end if
       call accept(self, h, t_new)
       if (self%system%has_quadratures()) &
          call self%system%note_quadratures(self%y(self%system%n_controlled + 1:), self%quadrature_error)
@@ -702,21 +717,22 @@ contains
 
    !> Integrals of the states behind (q, p), by the nodes of the step or, if these are too few for them, refined (not in fixed
    !> steps, in which the motion has no tolerance either).
-   subroutine add_quadratures(self, t, y)
+   subroutine add_quadratures(self, t, y, ok)
       class(gauss_integrator), intent(inout) :: self
       real(wp), intent(in) :: t    !! at the start of the step [s]
       real(wp), intent(in) :: y(:) !! there
+      logical, intent(out) :: ok   !! false: the rates cannot be evaluated at a node
       real(wp) :: power(s, n_quadratures) ! rates at the nodes
       real(wp), dimension(n_quadratures) :: rate, values
       real(wp) :: tolerance
-      logical :: ok
-      integer :: i
+      integer :: i, n_steps
 
       associate (m => self%mechanics%n_dof, h => self%now%h, error => self%quadrature_error)
          do i = 1, s
             self%node_state(:m) = self%trial%q(i, :)
             self%node_state(m + 1:) = self%trial%p(i, :)
             call self%system%quadratures(t + h*self%rule%c(i), self%node_state, rate, ok)
+            if (.not. ok) return
             power(i, :) = rate
          end do
          do i = 1, n_quadratures
@@ -725,18 +741,18 @@ contains
          end do
          if (self%n_grid > 0) return
          values = y(2*m + 1:) + self%increment(2*m + 1:)
-         tolerance = self%system%quadrature_tolerance(self%options%rtol, values)
+         tolerance = self%system%quadrature_tolerance(self%options%rtol, self%options%atol, values)
          if (maxval(error) <= tolerance) return
          call compare_halves(self, t)
          if (maxval(error) <= tolerance .or. .not. self%refines) return
          call self%refinement%refine(self%system, t, y, t + h, self%options%rtol, self%options%atol, tolerance, &
-                                     self%increment(2*m + 1:), error, self%counts%n_rhs, ok)
-         self%refines = ok ! explicit steps cannot follow what is stiff: they are not tried again before the next start
+                                     self%increment(2*m + 1:), error, self%counts%n_rhs, n_steps, self%refines)
+         call self%count_as_steps(n_steps)
       end associate
    end subroutine add_quadratures
 
    !> A better estimate where the last coefficients do not fall off, as those of small fast vibrations: the distance to the
-   !> same rule on both halves of the step, with its own polynomials.
+   !> same rule on both halves of the step, with its own polynomials. None, if that cannot be evaluated.
    subroutine compare_halves(self, t)
       class(gauss_integrator), intent(inout) :: self
       real(wp), intent(in) :: t !! at the start of the step [s]
@@ -755,6 +771,7 @@ contains
                self%node_state(:m) = self%guess(i, :)
                self%node_state(m + 1:) = self%trial%a(i, :)
                call self%system%quadratures(t + h*(0.5_wp*half + 0.5_wp*self%rule%c(i)), self%node_state, rate, ok)
+               if (.not. ok) return
                both = both + 0.5_wp*h*self%rule%b(i)*rate
             end do
          end do

@@ -82,6 +82,7 @@ module rodyn_integrator
       procedure :: check_target
       procedure :: permit_step
       procedure :: heed_monitor
+      procedure :: count_as_steps
       procedure :: state_within
    end type integrator_type
 
@@ -251,6 +252,13 @@ contains
       call look_at_clock(self, t)
       if (self%monitor%stop_requested()) call raise(error, 'stopped on request at t = '//time_text(t)//' s', exit_stopped)
    end subroutine heed_monitor
+
+   !> Within a step, or an output, there was other work, about that of so many steps: the monitor is asked so much earlier.
+   subroutine count_as_steps(self, n)
+      class(integrator_type), intent(inout) :: self
+      integer, intent(in) :: n
+      self%steps_to_look = max(1, self%steps_to_look - n)
+   end subroutine count_as_steps
 
    !> After `judged_steps` steps: would it take `hopeless` of them to get to the stop time?
    pure logical function is_hopeless(done, left)

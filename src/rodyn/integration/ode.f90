@@ -14,7 +14,7 @@ module rodyn_ode
 
    !> A system of `n_controlled` equations, and quadratures behind them (work, dissipated energy), `n_states` in all. No equation
    !> depends on a quadrature, so a run with them makes the same steps as one without. Their error is controlled apart: that of
-   !> each step is held below rtol times the largest scale that they have had, in shorter steps of their own if need be.
+   !> each step is held below `quadrature_tolerance`, in shorter steps of their own if need be.
    !>
    !> Implicit methods solve (1 - g df/dy) x = r by `factorise_newton` and `solve_newton`. A system that knows the
    !> structure of its Jacobian overrides both.
@@ -24,6 +24,7 @@ module rodyn_ode
       integer :: n_events = 0     !! functions whose sign changes end the smooth part of the run
       real(wp) :: quadrature_base = 0.0_wp  !! what quadratures are compared with beside themselves, of their unit
       real(wp) :: quadrature_scale = 0.0_wp !! the largest sum of that and their absolute values so far
+      real(wp) :: unit_energy = 0.0_wp      !! kinetic energy at rates of one: what a tolerance of rates is as energy
       real(wp) :: quadrature_error(n_quadratures) = 0.0_wp !! their estimated errors, summed over the steps
       type(dense_newton), private :: dense
    contains
@@ -142,20 +143,26 @@ contains
    end subroutine quadratures
 
    !> Before a run: nothing has been summed up yet.
-   subroutine begin_quadratures(self, base)
+   subroutine begin_quadratures(self, base, unit_energy)
       class(ode_system), intent(inout) :: self
-      real(wp), intent(in) :: base !! what they are compared with beside themselves, >= 0
+      real(wp), intent(in) :: base        !! what they are compared with beside themselves, >= 0
+      real(wp), intent(in) :: unit_energy !! kinetic energy at rates of one, > 0
       self%quadrature_base = base
+      self%unit_energy = unit_energy
       self%quadrature_scale = 0.0_wp
       self%quadrature_error = 0.0_wp
    end subroutine begin_quadratures
 
-   !> The error that a step to these values may make; 0: none is known.
-   pure real(wp) function quadrature_tolerance(self, rtol, values) result(tolerance)
+   !> The error that a step to these values may make: rtol of the largest energy E so far, which is at most the initial one and the
+   !> sums, and what E changes by where rates are off by atol, as the motion's may be. With E = e v^2, e being the kinetic energy at
+   !> rates of one, that is e (v + atol)^2 - E. So at rest, where powers are rounding alone, the tolerance does not vanish.
+   pure real(wp) function quadrature_tolerance(self, rtol, atol, values) result(tolerance)
       class(ode_system), intent(in) :: self
-      real(wp), intent(in) :: rtol
+      real(wp), intent(in) :: rtol, atol !! of the motion
       real(wp), intent(in) :: values(n_quadratures)
-      tolerance = rtol*max(self%quadrature_scale, self%quadrature_base + sum(abs(values)))
+      real(wp) :: energy
+      energy = max(self%quadrature_scale, self%quadrature_base + sum(abs(values)))
+      tolerance = rtol*energy + atol*(2.0_wp*sqrt(self%unit_energy*energy) + atol*self%unit_energy)
    end function quadrature_tolerance
 
    !> A step to these values is done, with so much of an error.

@@ -25,7 +25,7 @@ module rodyn_quadrature_refinement
 contains
 
    !> Integrals from t to t_end of the motion that starts at y.
-   subroutine refine(self, system, t, y, t_end, rtol, atol, tolerance, integral, error, n_rhs, ok)
+   subroutine refine(self, system, t, y, t_end, rtol, atol, tolerance, integral, error, n_rhs, n_steps, ok)
       class(quadrature_refinement), intent(inout) :: self
       class(ode_system), intent(inout) :: system
       real(wp), intent(in) :: t, t_end         !! [s]
@@ -35,9 +35,9 @@ contains
       real(wp), intent(inout) :: integral(n_quadratures) !! unchanged unless ok
       real(wp), intent(inout) :: error(n_quadratures)    !! and the estimated error
       integer(i8), intent(inout) :: n_rhs      !! is increased
+      integer, intent(out) :: n_steps          !! tried
       logical, intent(out) :: ok               !! false: the motion cannot be followed in so many steps
       real(wp) :: sum_of_errors(n_quadratures), now, h, norm
-      integer :: i
 
       if (.not. allocated(self%k)) call reserve(self, size(y))
       self%y(:) = y
@@ -47,7 +47,7 @@ contains
       h = 0.5_wp*(t_end - t)
       call system%rhs(now, self%y, self%f, ok)
       n_rhs = n_rhs + 1
-      do i = 1, most_steps
+      do n_steps = 1, most_steps
          if (.not. ok) return
          if (now + 1.01_wp*h >= t_end) h = t_end - now
          call try(self, system, now, h, rtol, atol, tolerance, norm)
@@ -62,7 +62,7 @@ contains
          end if
          h = h*min(grow, max(shrink, safety*max(norm, tiny(norm))**(-0.125_wp)))
       end do
-      ok = ok .and. i <= most_steps
+      ok = ok .and. n_steps <= most_steps
       if (.not. ok) return
       integral = self%y(system%n_controlled + 1:)
       error = sum_of_errors
