@@ -143,14 +143,15 @@ contains
    subroutine wrong_types(error)
       type(error_type), allocatable, intent(out) :: error
       call expect_faults(error, &
-         valid//'&case title = 3, t_end = .true., n_outputs = 1.5 /'//nl//&
+         valid//'&case title = 3, t_end = .true., n_outputs = 1.5 /'//nl//'&model gauss_points = 1e1 /'//nl// &
          '&output ledger = 1, compression = ''4'' /'//nl//'&solver method = adams /', &
          'c.nml:3: &case title = 3: must be a text in quotes'//nl//&
          'c.nml:3: &case t_end = .true.: must be a number [s]'//nl//&
          'c.nml:3: &case n_outputs = 1.5: must be a whole number'//nl//&
-         'c.nml:4: &output ledger = 1: must be .true. or .false.'//nl//&
-         'c.nml:4: &output compression = ''4'': must be a whole number; without quotes'//nl//&
-         'c.nml:5: &solver method = adams: must be ''auto'', ''adams'', ''bdf'', ''erk'', ''dop853'' or ''gauss'', in '//&
+         'c.nml:4: &model gauss_points = 1e1: must be a whole number; write 10'//nl//&
+         'c.nml:5: &output ledger = 1: must be .true. or .false.'//nl//&
+         'c.nml:5: &output compression = ''4'': must be a whole number; without quotes'//nl//&
+         'c.nml:6: &solver method = adams: must be ''auto'', ''adams'', ''bdf'', ''erk'', ''dop853'' or ''gauss'', in '//&
          'quotes')
    end subroutine wrong_types
 

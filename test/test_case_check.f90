@@ -25,6 +25,7 @@ contains
       suite = [new_test('a case in memory is refused in the words of a file', test_same_words), &
                new_test('arrays of a case in memory are as long as what they run over', test_lengths), &
                new_test('what a case in memory leaves out has its default', test_defaults), &
+               new_test('words of a case in memory may be of any case', test_words), &
                new_test('numbers in messages have as few digits as give them back', test_plain_text), &
                new_test('later groups are told by their number', test_instances)]
    end subroutine collect_case_check
@@ -131,11 +132,11 @@ contains
          config%loads(1)%value = 3.0_wp
          config%loads(1)%rise_time = 1.0_wp
       case (22)
-         text = "&load law = 'table', times = 0, 2*2, values = 2*1 /"
+         text = "&load law = 'table', times = 0, 3*2, values = 2*1 /"
          call add_load()
          config%loads(1)%law = 'table'
          config%loads(1)%value = 0.0_wp
-         config%loads(1)%times = [0.0_wp, 2.0_wp, 2.0_wp]
+         config%loads(1)%times = [0.0_wp, 2.0_wp, 2.0_wp, 2.0_wp]
          config%loads(1)%values = [1.0_wp, 1.0_wp]
       case (23)
          text = "&load law = 'table' /"
@@ -155,10 +156,11 @@ contains
          config%loads(1)%law = 'smooth_step'
          config%loads(1)%rise_time = 3.0_wp
       case (26)
-         text = "&load law = 'smooth_step', value = 1, t_start = 1 /"
+         text = "&load law = 'smooth_step', value = 1, t_start = 1, t_end = 1 /"
          call add_load()
          config%loads(1)%law = 'smooth_step'
          config%loads(1)%t_start = 1.0_wp
+         config%loads(1)%t_end = 1.0_wp
       case (27)
          text = "&load law = 'table', times = 0, 1, values = 1, 2, after = 'stay' /"
          call add_load()
@@ -180,10 +182,11 @@ contains
          call add_program()
          config%kink_programs(1)%law = 'swing'
       case (31)
-         text = '&kink_program hinge = 1, value = 1, t_start = 1 /'
+         text = '&kink_program hinge = 1, value = 1, t_start = 1, t_end = 1 /'
          call add_program()
          config%kink_programs(1)%hinge = 1
          config%kink_programs(1)%t_start = 1.0_wp
+         config%kink_programs(1)%t_end = 1.0_wp
       case (32)
          text = "&kink_program hinge = 0, law = 'table', value = 1, times = 0, 0.5, 0.25, values = 1, 2 /"
          call add_program()
@@ -328,12 +331,13 @@ contains
          call add_program()
          config%kink_programs(1)%t_start = 2.0_wp
       case (61)
-         text = "&case t_end = 0.5 / &load value = 1, t_start = 2 / &load value = 1, t_start = 0, law = 'smooth_step' /"
+         text = "&case t_end = 0.5 / &load value = 1, law = 'smooth_step', rise_time = 3 / &load value = 1, t_start = 2 /"
          config%t_end = 0.5_wp
          call add_load()
          config%loads = [config%loads, config%loads]
-         config%loads(1)%t_start = 2.0_wp
-         config%loads(2)%law = 'smooth_step'
+         config%loads(1)%law = 'smooth_step'
+         config%loads(1)%rise_time = 3.0_wp
+         config%loads(2)%t_start = 2.0_wp
       case (62)
          text = "&case t_end = -1 / &solver method = 'erk', fixed_step = 1e-12 /"
          config%t_end = -1.0_wp
@@ -437,7 +441,7 @@ contains
       if (.not. allocated(error)) call refused(6, '&chain n_rods = -3: must lie in 1..1000000')
       if (.not. allocated(error)) call refused(7, "&chain bending_stiffness: is required unless bending = 'rigid'")
       if (.not. allocated(error)) call refused(8, "&spacecraft mass: is required when motion = 'free'")
-      if (.not. allocated(error)) call refused(9, "&spacecraft motion = 'FIXED': must be 'free' or 'fixed'")
+      if (.not. allocated(error)) call refused(9, "&spacecraft motion = 'FIX': must be 'free' or 'fixed'")
       if (.not. allocated(error)) call refused(10, "&spacecraft inertia = -2: must be positive [kg m^2]")
 
    contains
@@ -469,7 +473,7 @@ contains
          case (8)
             config%spacecraft%mass = 0.0_wp
          case (9)
-            config%spacecraft%motion = 'FIXED'
+            config%spacecraft%motion = 'FIX'
          case (10)
             config%spacecraft%inertia = -2.0_wp
          case default ! there is no other
@@ -520,6 +524,40 @@ contains
       call initial_state(motion, config%initial, y)
       call check(error, all(ieee_is_nan(y)), 'a state of three angles for two rods')
    end subroutine test_defaults
+
+   !> As a file's: they are read with the spelling of the table, also where other keys depend on them.
+   subroutine test_words(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config, of_file, resolved
+      type(scene_type) :: scene
+
+      call parse_case(valid, 'c.nml', config, error)
+      if (.not. allocated(error)) call parse_case(valid// &
+         "&model bending = 'rigid', kernel = 'assembled' / &solver method = 'dop853' /"// &
+         "&load law = 'table', target = 'node', node = 2, component = 'X', times = 0, 0.5, 0.5, 1, values = 1, 1, 2, 2,"// &
+         "after = 'hold' / &kink_program hinge = 1, law = 'sine', value = 1, rate = 2 /", 'c.nml', of_file, error)
+      if (allocated(error)) return
+      config%model%bending = 'Rigid'
+      config%model%kernel = 'ASSEMBLED'
+      config%solver%method = 'DOP853'
+      deallocate (config%loads, config%kink_programs)
+      allocate (config%loads(1), config%kink_programs(1))
+      associate (load => config%loads(1), program => config%kink_programs(1))
+         load%law = 'Table'
+         load%target = 'Node'
+         load%node = 2
+         load%component = 'x'
+         load%times = [0.0_wp, 0.5_wp, 0.5_wp, 1.0_wp]
+         load%values = [1.0_wp, 1.0_wp, 2.0_wp, 2.0_wp]
+         load%after = 'HOLD'
+         program%hinge = 1
+         program%law = 'Sine'
+         program%value = 1.0_wp
+         program%rate = 2.0_wp
+      end associate
+      call new_scene(scene, config, error, resolved)
+      if (.not. allocated(error)) call check(error, resolved_case(resolved), resolved_case(of_file), 'values used')
+   end subroutine test_words
 
    subroutine test_plain_text(error)
       type(error_type), allocatable, intent(out) :: error

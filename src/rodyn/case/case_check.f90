@@ -13,8 +13,8 @@ module rodyn_case_check
    use rodyn_faults, only: fault_list
    use rodyn_field_visitor, only: field_visitor
    use rodyn_key_judge, only: key_judge
-   use rodyn_schema, only: any_list, requirement, row_index, rule_text, satisfies, schema_extent, up_to, count_rule
-   use rodyn_text, only: has_word, printable, quoted, to_text
+   use rodyn_schema, only: any_list, matching_word, requirement, row_index, rule_text, satisfies, schema_extent, up_to, count_rule
+   use rodyn_text, only: has_word, printable, quoted, to_text, word
    implicit none (type, external)
    private
    public :: sound_case, complete_case
@@ -69,6 +69,7 @@ contains
       type(case_config), target, intent(in) :: given
       type(case_config), target, intent(out) :: config
       type(error_type), allocatable, intent(out) :: error
+      type(case_config), target :: spelt !! what was given, its words as in the table
       type(case_judge), target :: judge
       type(value_checker) :: checker
       integer :: n
@@ -85,6 +86,8 @@ contains
       if (.not. satisfies(case_rows(row_index(case_rows, 'chain', 'n_rods')), real(n, wp))) n = 0
       checker%extents = case_extents(n)
       call visit_case(checker, config)
+      spelt = config
+      judge%given => spelt
       call complete_case(judge, config)
       call check_case(judge, config)
       call judge%faults%to_error('', error)
@@ -102,16 +105,23 @@ contains
       if (.not. judge%is_sound('case', 1, 't_end')) return
       do i = 1, size(config%loads)
          associate (load => config%loads(i))
-            if (is_none(load%t_end)) load%t_end = config%t_end
+            if (is_none(load%t_end)) load%t_end = end_by_default(load%t_start, config%t_end)
             if (load%law == 'smooth_step' .and. is_unset(load%rise_time)) load%rise_time = load%t_end - load%t_start
          end associate
       end do
       do i = 1, size(config%kink_programs)
          associate (program => config%kink_programs(i))
-            if (program%law /= 'table' .and. is_none(program%t_end)) program%t_end = config%t_end
+            if (program%law /= 'table' .and. is_none(program%t_end)) program%t_end = end_by_default(program%t_start, config%t_end)
          end associate
       end do
    end subroutine complete_case
+
+   !> The end of the case; of what begins later, and so never acts, some time after its beginning.
+   elemental real(wp) function end_by_default(t_start, end_of_case) result(t_end)
+      real(wp), intent(in) :: t_start, end_of_case !! [s]
+      t_end = end_of_case
+      if (t_start >= end_of_case) t_end = t_start + min(t_start, huge(t_start) - t_start)
+   end function end_by_default
 
    !> Does a number still have the initial value of its type?
    elemental logical function is_unset(x)
@@ -493,15 +503,23 @@ contains
       call find(self, key)
    end subroutine logical_field
 
-   !> Words are spelt as in the table; the reader of a file sees to that.
+   !> A word takes the spelling of the table, as in a file.
    subroutine word_field(self, key, x)
       class(value_checker), intent(inout) :: self
       character(len=*), intent(in) :: key
       character(len=name_length), intent(inout) :: x
+      integer :: k
 
       call find(self, key)
-      if (.not. has_word(case_rows(self%row)%words, x)) &
-         call reject(self, '', ' = '//printable(quoted(trim(x)), 60), requirement(case_rows(self%row)))
+      associate (row => case_rows(self%row))
+         if (has_word(row%words, x)) return
+         k = matching_word(row, x)
+         if (k == 0) then
+            call reject(self, '', ' = '//printable(quoted(trim(x)), 60), requirement(row))
+         else
+            x = word(row%words, k)
+         end if
+      end associate
    end subroutine word_field
 
    subroutine text_field(self, key, x)

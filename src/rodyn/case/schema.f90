@@ -2,15 +2,15 @@
 !> validation, defaults and documentation are read off it.
 module rodyn_schema
    use rodyn_kinds, only: wp
-   use rodyn_text, only: edit_distance, to_text, word, word_count
+   use rodyn_text, only: edit_distance, lower, to_text, word, word_count
    implicit none (type, external)
    private
    public :: schema_group, schema_row, schema_extent
    public :: type_integer, type_real, type_logical, type_word, type_text
    public :: one_value, any_list
    public :: no_rule, positive, not_negative, at_least, in_range, between, up_to
-   public :: satisfies, rule_text, requirement, count_rule, row_index, group_index, nearest_key, nearest_group, misspelt_key, &
-      misspelt_group
+   public :: satisfies, matching_word, rule_text, requirement, count_rule, row_index, group_index, nearest_key, nearest_group, &
+      misspelt_key, misspelt_group
 
    !> Types of a key. A word is one of a fixed list; a text is free.
    integer, parameter :: type_integer = 1, type_real = 2, type_logical = 3, type_word = 4, type_text = 5
@@ -97,6 +97,16 @@ contains
       end select
       if (len(text) > 0) text = text//unit_text(row)
    end function rule_text
+
+   !> Which of the row's words a text is, case and trailing blanks aside; 0 if none.
+   pure integer function matching_word(row, text) result(found)
+      type(schema_row), intent(in) :: row
+      character(len=*), intent(in) :: text
+      do found = 1, word_count(row%words)
+         if (lower(word(row%words, found)) == lower(text)) return
+      end do
+      found = 0
+   end function matching_word
 
    !> What kind of value the row takes: 'must be a number [m]'.
    pure function requirement(row) result(text)

@@ -6,9 +6,8 @@ module rodyn_field_loader
    use rodyn_field_visitor, only: field_visitor
    use rodyn_checked_document, only: checked_document, group_at
    use rodyn_namelist_document, only: namelist_value, string_content
-   use rodyn_schema, only: any_list
+   use rodyn_schema, only: any_list, matching_word
    use rodyn_text, only: word
-   use rodyn_value_rules, only: matching_word
    implicit none (type, external)
    private
    public :: field_loader

@@ -1,13 +1,14 @@
 !> Does one value of a namelist keep the rules of its row?
 module rodyn_value_rules
+   use rodyn_kinds, only: wp
    use rodyn_namelist_document, only: namelist_document, namelist_value, string_content, is_integer, &
       is_long_integer, is_real, is_too_large, is_too_small, is_not_finite, is_logical, is_string, is_word
    use rodyn_schema, only: schema_row, type_integer, type_logical, type_real, type_word, requirement, rule_text, &
-      satisfies, up_to
-   use rodyn_text, only: lower, word, word_count
+      matching_word, satisfies, up_to
+   use rodyn_text, only: lower, to_text
    implicit none (type, external)
    private
-   public :: broken_rule, matching_word
+   public :: broken_rule
 
 contains
 
@@ -21,7 +22,7 @@ contains
       select case (row%type)
       case (type_integer, type_real)
          call broken_number_rule(row, value, rule)
-         if (allocated(rule)) rule = rule//number_hint(document, value)
+         if (allocated(rule)) rule = rule//number_hint(document, row, value)
       case (type_logical)
          if (value%kind /= is_logical) rule = requirement(row)
       case (type_word)
@@ -70,14 +71,19 @@ contains
       end select
    end subroutine broken_number_rule
 
-   !> What may have been meant by something that is no number.
-   pure function number_hint(document, value) result(hint)
+   !> What may have been meant by something that is no number, or no whole one.
+   pure function number_hint(document, row, value) result(hint)
       type(namelist_document), intent(in) :: document
+      type(schema_row), intent(in) :: row
       type(namelist_value), intent(in) :: value
       character(len=:), allocatable :: hint
       logical :: digits
 
       hint = ''
+      if (value%kind == is_real .and. row%type == type_integer) then
+         if (abs(value%x) < real(huge(1), wp) .and. abs(value%x - anint(value%x)) <= 0.0_wp) &
+            hint = '; write '//to_text(nint(value%x))
+      end if
       if (value%kind /= is_word .and. value%kind /= is_string) return
       associate (text => document%text(value%first:value%last))
          digits = scan(text, '0123456789') > 0
@@ -92,15 +98,5 @@ contains
          end if
       end associate
    end function number_hint
-
-   !> Which of the row's words a text is, case and trailing blanks aside; 0 if none.
-   pure integer function matching_word(row, text) result(found)
-      type(schema_row), intent(in) :: row
-      character(len=*), intent(in) :: text
-      do found = 1, word_count(row%words)
-         if (lower(word(row%words, found)) == lower(text)) return
-      end do
-      found = 0
-   end function matching_word
 
 end module rodyn_value_rules

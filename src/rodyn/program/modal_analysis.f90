@@ -2,6 +2,7 @@
 module rodyn_modal_analysis
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: case_config, load_config
+   use rodyn_case_check, only: sound_case
    use rodyn_case_notes, only: case_notes, joined_lines
    use rodyn_case_reader, only: resolved_case
    use rodyn_equilibrium, only: find_equilibrium
@@ -28,8 +29,8 @@ module rodyn_modal_analysis
 contains
 
    !> Compute the modes of a case, write them, and print a table.
-   subroutine analyse_modes(config, path, equilibrium, loads, error, input_text, force, quiet)
-      type(case_config), intent(in) :: config
+   subroutine analyse_modes(given, path, equilibrium, loads, error, input_text, force, quiet)
+      type(case_config), intent(in) :: given
       character(len=*), intent(in) :: path                 !! of the HDF5 file
       logical, intent(in) :: equilibrium                   !! about the equilibrium near the initial state, under loads
       logical, intent(in) :: loads                         !! about the initial state: the loads of t = 0 act
@@ -37,7 +38,7 @@ contains
       character(len=*), intent(in), optional :: input_text !! namelist as read, kept in the file
       logical, intent(in), optional :: force               !! replace an existing file
       logical, intent(in), optional :: quiet               !! print nothing
-      type(case_config) :: resolved !! with what is not given
+      type(case_config) :: config !! with what is not given
       type(scene_type) :: scene
       type(motion_type) :: motion
       type(linear_model) :: model
@@ -50,16 +51,17 @@ contains
       if (present(quiet)) silent = quiet
       if (present(force)) replace = force
       call check_output_path(path, replace, error)
+      if (.not. allocated(error)) call sound_case(given, config, error)
       if (.not. allocated(error)) call check_memory('n_rods = '//to_text(config%chain%n_rods), &
                                                     of_program + memory_of_scene(config), error)
-      if (.not. allocated(error)) call new_scene(scene, config, error, resolved)
+      if (.not. allocated(error)) call new_scene(scene, config, error)
       if (.not. allocated(error)) call new_motion(motion, scene, .false., error)
       if (.not. allocated(error)) call modes_at_start(motion, config, equilibrium, loads, .true., model, modes, error)
       if (allocated(error)) return
       origin%title = ''
       if (allocated(config%title)) origin%title = config%title
-      origin%resolved_input = resolved_case(resolved)
-      origin%notes = joined_lines(case_notes(resolved, .false.), notes_on(motion%dynamics%scene, model%q(:scene%n_dof), .false.))
+      origin%resolved_input = resolved_case(config)
+      origin%notes = joined_lines(case_notes(config, .false.), notes_on(motion%dynamics%scene, model%q(:scene%n_dof), .false.))
       origin%sundials_version = sundials_version()
       if (present(input_text)) origin%input = input_text
       call write_modes(path, replace, origin, motion%dynamics%scene, model, modes, equilibrium, error)

@@ -5,6 +5,7 @@ module rodyn_run
    use rodyn_text, only: formatted, to_text
    use rodyn_errors, only: error_type, raise, exit_stopped
    use rodyn_case_config, only: case_config
+   use rodyn_case_check, only: sound_case
    use rodyn_case_notes, only: case_notes, joined_lines
    use rodyn_case_reader, only: resolved_case
    use rodyn_scene, only: scene_type, new_scene
@@ -48,8 +49,8 @@ contains
    !> status 'failed', or `path`.failed where `force` is set and there is a result that has not failed; on refused input nothing
    !> is written. A run that is asked to stop (see `watch_signals`) leaves
    !> its rows in `path`.stopped, so that the same call can be made again; of two stopped runs the more rows stay.
-   subroutine run_case(config, path, error, input_text, force, quiet, load, name)
-      type(case_config), intent(in) :: config
+   subroutine run_case(given, path, error, input_text, force, quiet, load, name)
+      type(case_config), intent(in) :: given
       character(len=*), intent(in) :: path                 !! of the HDF5 file
       type(error_type), allocatable, intent(out) :: error
       character(len=*), intent(in), optional :: input_text !! namelist as read, kept in the file
@@ -57,7 +58,7 @@ contains
       logical, intent(in), optional :: quiet               !! print nothing
       class(user_load), target, intent(inout), optional :: load !! forces of the caller's, beside those of the case
       character(len=*), intent(in), optional :: name       !! of the case, for what is refused of its keys
-      type(case_config) :: resolved !! with what is not given
+      type(case_config) :: config !! with what is not given
       type(scene_type) :: scene
       type(motion_type), target :: motion
       type(recorder_type) :: recorder
@@ -79,8 +80,9 @@ contains
       call use_one_thread() ! or the number of cores would decide the last digits
 
       call check_output_path(path, replace, error)
+      if (.not. allocated(error)) call sound_case(given, config, error)
       if (.not. allocated(error)) call check_needs(config, path, error)
-      if (.not. allocated(error)) call new_scene(scene, config, error, resolved)
+      if (.not. allocated(error)) call new_scene(scene, config, error)
       if (.not. allocated(error)) call new_motion(motion, scene, config%output%ledger, error)
       if (allocated(error)) return
       if (present(load)) call motion%set_user_load(load)
@@ -91,7 +93,7 @@ contains
                       progress)
       if (allocated(error) .and. present(name)) error%message = name//': '//error%message
       if (allocated(error)) return
-      header%notes = joined_lines(case_notes(resolved, .true.), notes_on(scene, y(:scene%n_dof), config%output%ledger))
+      header%notes = joined_lines(case_notes(config, .true.), notes_on(scene, y(:scene%n_dof), config%output%ledger))
       if (.not. silent) then
          call print_line(describe_scene(scene, config%output%ledger))
          call print_line('method  '//driver%methods()//': '//driver%reason())
@@ -103,7 +105,7 @@ contains
       header%title = ''
       if (allocated(config%title)) header%title = config%title
       header%input = ''
-      header%resolved_input = resolved_case(resolved)
+      header%resolved_input = resolved_case(config)
       header%sundials_version = sundials_version()
       header%n_rods = scene%n
       header%n_rows = config%n_outputs + 1
@@ -128,7 +130,7 @@ contains
          call close_file(recorder, driver, motion, config, failure, &
                       real(clock_end - clock_start, wp)/real(clock_rate, wp), error)
       written = recorder%file%path ! a run that has stopped or failed may have stepped aside
-      if (.not. silent .and. .not. allocated(error)) call print_events(motion)
+      if (.not. silent .and. .not. allocated(error)) call print_events(motion, recorder%energy_scale)
       if (.not. silent .and. .not. allocated(error)) &
          call print_result(driver, recorder, written, config, t, &
                            real(clock_end - clock_start, wp)/real(clock_rate, wp), failure)
@@ -247,16 +249,22 @@ contains
       end associate
    end subroutine write_events
 
-   !> Each event on a line of its own, as long as they are few.
-   subroutine print_events(motion)
+   !> Each event on a line of its own, as long as they are few. A loss is a difference of energies: what rounding leaves of it
+   !> is none.
+   subroutine print_events(motion, energy_scale)
       type(motion_type), intent(in) :: motion
+      real(wp), intent(in) :: energy_scale !! largest energy of the run; 0: not known [J]
       integer, parameter :: most_lines = 20
+      real(wp) :: lost, least
       integer :: i
 
+      least = 16.0_wp*epsilon(1.0_wp)*energy_scale
       do i = 1, min(most_lines, motion%events%n_logged)
          associate (event => motion%events%log(i))
+            lost = event%energy_lost
+            if (abs(lost) <= least) lost = 0.0_wp
             call print_line('event   t = '//time_text(event%time)//' s: hinge '//to_text(event%hinge)//' '// &
-               trim(kind_names(event%kind))//', '//formatted(event%energy_lost, '(es10.3)')//' J lost')
+               trim(kind_names(event%kind))//', '//formatted(lost, '(es10.3)')//' J lost')
          end associate
       end do
       if (motion%events%n_logged > most_lines) call print_line('event   and '// &

@@ -16,13 +16,12 @@ module rodyn_sweep_reader
    use rodyn_namelist_document, only: namelist_document, group_count
    use rodyn_namelist_edit, only: split_key
    use rodyn_namelist_parser, only: parse_document
-   use rodyn_schema, only: schema_row, any_list, group_index, nearest_key, nearest_group, positive, row_index, rule_text, &
-      satisfies, type_integer, type_logical, type_real, type_word
+   use rodyn_schema, only: schema_row, any_list, group_index, matching_word, nearest_key, nearest_group, positive, row_index, &
+      rule_text, satisfies, type_integer, type_logical, type_real, type_word
    use rodyn_sweep_case, only: build_values
    use rodyn_sweep_config, only: sweep_axis, sweep_config, axis_size, is_ratio, shown_value
    use rodyn_sweep_schema, only: sweep_extents, sweep_groups, sweep_rows
    use rodyn_text, only: formatted, lower, printable, tidy, to_text
-   use rodyn_value_rules, only: matching_word
    implicit none (type, external)
    private
    public :: parse_sweep, find_base, is_sweep_text, default_sweep
