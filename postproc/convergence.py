@@ -4,7 +4,8 @@
     postproc/convergence.py results/steps --axis solver.fixed_step --quantity "phi(4)" "alpha_rate(1)"
     postproc/convergence.py results/tolerances --axis solver.rtol --reference table1.h5
 
-The reference is a run, numbers, or the finest case of each line. Filled marks are those that the fit used.
+The reference is a run, numbers, or the finest case of each line. Filled marks are those that the fit used. Along an axis that
+refines nothing, such as mass_ratio, no order is fitted, and the finest case is that of the smallest value.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from sweep_lines import default_quantities, heading, mark_failed
 
 COUNTS = ("case.n_outputs", "chain.n_rods", "model.gauss_points")  # finer when larger
 DEFAULT_AXES = ("solver.fixed_step", "solver.rtol", *COUNTS)
+REFINEMENTS = (*DEFAULT_AXES, "solver.atol", "solver.max_step")  # over others nothing converges, and there is no order
 FEWEST_FITTED, MOST_FITTED = 3, 5
 
 
@@ -108,7 +110,7 @@ def draw(sweep: Sweep, names: Sequence[str], axis: str, known: Sequence[float | 
     columns = min(2, len(names))
     rows = -(-len(names) // columns)
     figure, grid = style.new_figure(rows, columns, height=0.9 + 2.9 * rows)
-    than = "finest case of each line" if known[0] is None else "reference"
+    than = "reference" if known[0] is not None else f"{'finest case' if axis in REFINEMENTS else 'smallest value'} of each line"
     figure.suptitle(f"{heading(sweep, names, time, where)}\nerror against the {than}")
     figure.fits = {}
     for axes, name, value in zip(grid.flat, names, known, strict=False):
@@ -137,7 +139,8 @@ def draw_panel(axes: Axes, sweep: Sweep, name: str, axis: str, exact: float | No
         best = values[finest] if exact is None else exact
         error = np.abs(values - best)
         error[error == 0] = np.nan
-        fit = fit_order(fineness, error, floor=8 * np.finfo(float).eps * max(abs(best), np.finfo(float).tiny))
+        floor = 8 * np.finfo(float).eps * max(abs(best), np.finfo(float).tiny)
+        fit = fit_order(fineness, error, floor) if axis in REFINEMENTS else None
         fits[name, series.label] = fit
         draw_line(axes, i, x, error, fit, series.label, rising)
     mark_failed(axes, failed, int(sweep.chosen(where).sum()))

@@ -59,9 +59,11 @@ def draw(sweep: Sweep, name: str, names: Sequence[str], where: Mapping[str, Any]
     signed = np.nanmin(picture, initial=0.0) < 0 < np.nanmax(picture, initial=0.0)
     mesh = axes.pcolormesh(np.arange(len(values[0]) + 1) - 0.5, np.arange(len(values[1]) + 1) - 0.5, np.ma.masked_invalid(picture),
                            cmap=style.SEQUENCE, edgecolors="white" if picture.size <= 400 else "none", linewidth=0.4)
+    bar = figure.colorbar(mesh, ax=axes, label=quantity.label)
     if signed and picture.size > 16 and np.isfinite(picture).sum() > 4 and min(picture.shape) > 2:
-        axes.contour(np.ma.masked_invalid(picture), levels=[0.0], colors="white", linestyles="--", linewidths=0.9)
-    figure.colorbar(mesh, ax=axes, label=quantity.label)
+        zero = axes.contour(np.ma.masked_invalid(picture), levels=[0.0], colors="white", linestyles="--", linewidths=0.9)
+        bar.add_lines(zero)
+        bar.set_label(f"{quantity.label}; dashed line: zero")
     ticks(axes.xaxis, values[0])
     ticks(axes.yaxis, values[1])
     axes.set(xlabel=sweep.axis_label(names[0]), ylabel=sweep.axis_label(names[1]))

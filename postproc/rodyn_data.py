@@ -552,7 +552,11 @@ def distinct(values: np.ndarray) -> list[Any]:
 
 def opened(path: str | pathlib.Path) -> h5py.File:
     """The file, or a DataError that says why not."""
-    if not pathlib.Path(path).is_file():
+    path = pathlib.Path(path)
+    if path.is_dir():
+        raise DataError(f"{path}: is the directory of a sweep; this script reads run files" if (path / "sweep.h5").is_file()
+                        else f"{path}: is a directory, not a file")
+    if not path.is_file():
         raise DataError(f"{path}: there is no such file")
     try:
         return h5py.File(path, "r")

@@ -15,7 +15,7 @@ import numpy as np
 import style
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from natural_frequencies import natural_frequencies
+from natural_frequencies import beyond_us, natural_frequencies
 from rodyn_data import DataError, Quantity, Run, open_run
 
 MANY_RODS = 300  # the frequencies of a longer chain take long
@@ -72,12 +72,18 @@ def draw(run: Run, quantities: Sequence[Quantity], start: float | None, highest:
         lower = omega[1]
         axes.set_xlim(lower, upper)
         mark_frequencies(axes, frequencies[(frequencies <= upper) & (frequencies >= lower)], label=i == 0)
-        beyond = int(np.sum(frequencies > upper))
-        if beyond and i == len(quantities) - 1:
-            axes.set_xlabel(f"angular frequency [rad/s]; {beyond} of {frequencies.size} natural frequencies lie beyond {upper:.4g} rad/s")
-        elif i == len(quantities) - 1:
-            axes.set_xlabel("angular frequency [rad/s]")
+    axes.set_xlabel("angular frequency [rad/s]" + left_out(run, frequencies, upper))
     return figure
+
+
+def left_out(run: Run, frequencies: np.ndarray, upper: float) -> str:
+    """Which natural frequencies are not marked, and why; empty if all are."""
+    if run.n_rods > MANY_RODS:
+        return f"; natural frequencies of more than {MANY_RODS} rods are not marked"
+    if groups := beyond_us(run):
+        return f"; natural frequencies are not marked: the scene has {' and '.join(groups)} (see rodyn modes)"
+    beyond = int(np.sum(frequencies > upper))
+    return f"; {beyond} of {frequencies.size} natural frequencies lie beyond {upper:.4g} rad/s" if beyond else ""
 
 
 def draw_panel(axes: Axes, quantity: Quantity, omega: np.ndarray, amplitude: np.ndarray) -> None:

@@ -166,6 +166,12 @@ def test_a_sweep_is_no_run(sweeps, name):
     assert result.returncode == 2 and "is a sweep file; this script reads run files" in result.stderr
 
 
+def test_the_directory_of_a_sweep_is_no_run(sweeps, tmp_path):
+    (tmp_path / "sweep.h5").write_bytes(sweeps["inertia"].read_bytes())
+    result = script("histories", tmp_path)
+    assert result.returncode == 2 and "is the directory of a sweep; this script reads run files" in result.stderr
+
+
 @pytest.mark.parametrize(("name", "kind", "options"), [
     ("histories", "n4", ["--quantity", "phi(4)", "omega"]), ("shape", "n4", ["--times", "0", "0.4", "-m", "25", "--frame", "inertial"]),
     ("animate", "n1", ["--seconds", "0.3"]), ("phase", "n4", ["--x", "phi(4)", "--y", "omega"]), ("ledger", "n1", []),

@@ -71,6 +71,7 @@ def test_a_spectrum_has_no_natural_frequencies_of_hinges_that_change(deployment,
         assert natural_frequencies(result).size == 0
     figure = spectrum.plot(deployment[0], tmp_path / "s.png", ["phi(1)"])
     assert len(figure.axes[0].lines) == 1
+    assert figure.axes[0].get_xlabel().endswith("; natural frequencies are not marked: the scene has &hinge (see rodyn modes)")
 
 
 def test_a_case_without_laws_of_hinges_has_no_events(runs):

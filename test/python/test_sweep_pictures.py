@@ -85,6 +85,21 @@ def test_a_map_has_its_cells_where_its_axes_say(sweeps, tmp_path):
     assert [t.get_text() for t in axes.get_xticklabels()] == ["2", "4", "8", "16", "32"]
 
 
+def test_a_map_says_what_its_dashed_line_is(sweeps, tmp_path):
+    path = tmp_path / "signed.h5"
+    path.write_bytes(sweeps["grid"].read_bytes())
+    with h5py.File(path, "a") as file:
+        file["phi"][...] = file["phi"][()] - np.nanmean(file["phi"][()])
+    labels = [heat_map.plot(p, tmp_path / "x.png", "phi(1)").axes[1].get_ylabel() for p in (sweeps["grid"], path)]
+    assert ["dashed line: zero" in label for label in labels] == [False, True]
+
+
+def test_what_refines_nothing_has_no_order(sweeps, tmp_path):
+    figure = convergence.plot(sweeps["inertia"], tmp_path / "x.png", ["phi(1)"], "mass_ratio", reference=[0.0])
+    assert set(figure.fits.values()) == {None}
+    assert {label.rpartition(": ")[2] for label in labelled(figure.axes[0]) if not label.startswith("_")} == {"no order"}
+
+
 def test_fitted_orders_are_those_of_the_data(sweeps, tmp_path):
     figure = convergence.plot(sweeps["orders"], tmp_path / "x.png", ["phi(1)"], reference=[0.25])
     assert abs(figure.fits["phi(1)", "erk"].order - 2) < 1e-6
