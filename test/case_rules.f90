@@ -44,7 +44,7 @@ contains
       call expect_faults(error, valid//'&kink_program hinge = 4, value = 1 /'//nl// &
          "&kink_program hinge = 0, law = 'sine', value = 1 /"//nl// &
          "&kink_program hinge = 0, law = 'table', value = 1, times = 0, 0, values = 1 /"//nl// &
-         '&kink_program hinge = 1, value = 1, t_start = 1 /'//nl// &
+         '&kink_program hinge = 1, value = 1, t_start = 1, t_end = 1 /'//nl// &
          "&kink_program hinge = 2, law = 'ramp', value = 1 /"//nl//'&hinge hinge = 2, held = .true. /', &
          'c.nml:3: &kink_program hinge = 4: there is no such hinge; they are numbered 0..3'//nl// &
          "c.nml:4: &kink_program rate: is required when law = 'sine'"//nl// &
@@ -176,11 +176,9 @@ contains
    subroutine load_reversed(error)
       type(error_type), allocatable, intent(out) :: error
       call expect_faults(error, &
-         valid//'&load value = 1, t_start = 3, t_end = 2 /'//nl//'&load value = 1, t_start = 3 /'//nl//&
-         '&load value = 1, t_end = -1 /', &
-         'c.nml:3: &load t_start = 3: must not be after t_end = 2.00000 [s]'//nl//&
-         'c.nml:4: &load t_start = 3: must not be after t_end = 1.00000 [s]'//nl//&
-         'c.nml:5: &load t_end = -1: must not be before t_start = 0.00000 [s]')
+         valid//'&load value = 1, t_start = 3, t_end = 2 /'//nl//'&load value = 1, t_end = -1 /', &
+         'c.nml:3: &load t_start = 3: must not be after t_end = 2.00000 [s] of the same load'//nl//&
+         'c.nml:4: &load t_end = -1: must not be before t_start = 0.00000 [s] of the same load')
    end subroutine load_reversed
 
    subroutine law_required(error)
@@ -220,8 +218,11 @@ contains
    subroutine table_order(error)
       type(error_type), allocatable, intent(out) :: error
       call expect_faults(error, &
-         valid//'&load law = ''table'', times = 0, 2, 2, values = 3*1 /', &
-         'c.nml:3: &load times = 0, 2, 2: must increase, but value 3, 2.00000, follows '//&
+         valid//'&load law = ''table'', times = 0, 2, 2, 2, values = 4*1 /'//nl// &
+         '&load law = ''table'', times = 0, 2, 1, values = 3*1 /', &
+         'c.nml:3: &load times = 0, 2, 2, 2: must increase, or jump at two equal times, but value 4, 2.00000, follows '// &
+         '2.00000 [s]'//nl// &
+         'c.nml:4: &load times = 0, 2, 1: must increase, or jump at two equal times, but value 3, 1.00000, follows '// &
          '2.00000 [s]')
    end subroutine table_order
 
@@ -230,10 +231,12 @@ contains
       call expect_faults(error, &
          valid//'&load law = ''smooth_step'', value = 1, rise_time = 3 /'//nl//&
          '&load law = ''smooth_step'', value = 1, rise_time = 0 /'//nl//&
-         '&load law = ''smooth_step'', value = 1, t_start = 1 /', &
-         'c.nml:3: &load rise_time = 3: must not exceed t_end - t_start = 1.00000 [s]'//nl//&
+         '&load law = ''smooth_step'', value = 1, t_start = 1, t_end = 1 /'//nl//&
+         '&load law = ''smooth_step'', value = 1, rise_time = 3, t_end = 2 /', &
+         'c.nml:3: &load rise_time = 3: must not exceed t_end - t_start = 1.00000 [s], with t_end of &case'//nl//&
          'c.nml:4: &load rise_time = 0: must be positive [s]'//nl//&
-         'c.nml:5: &load rise_time: must be positive, but t_end = t_start [s]')
+         'c.nml:5: &load rise_time: must be positive, but t_end = t_start [s]'//nl//&
+         'c.nml:6: &load rise_time = 3: must not exceed t_end - t_start = 2.00000 [s] of the same load')
    end subroutine rise_too_long
 
    subroutine fixed_step_adams(error)

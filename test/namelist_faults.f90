@@ -272,8 +272,12 @@ contains
    subroutine no_text(error)
       type(error_type), allocatable, intent(out) :: error
       character(len=*), parameter :: wide = '&'//char(0)//'c'//char(0)//'a'//char(0)//' '//char(0)
+      character(len=*), parameter :: nuls = repeat(char(0), 3), very_wide = '&'//nuls//'c'//nuls//'a'//nuls//' '//nuls
       call expect_faults(error, char(255)//char(254)//wide, 'c.nml:1: the file is UTF-16 text; save it as UTF-8')
       if (.not. allocated(error)) call expect_faults(error, wide, 'c.nml:1: the file is UTF-16 text; save it as UTF-8')
+      if (.not. allocated(error)) call expect_faults(error, very_wide, 'c.nml:1: the file is UTF-32 text; save it as UTF-8')
+      if (.not. allocated(error)) call expect_faults(error, char(255)//char(254)//repeat(char(0), 2)//very_wide, &
+         'c.nml:1: the file is UTF-32 text; save it as UTF-8')
       if (.not. allocated(error)) call expect_faults(error, valid//char(0), &
          'c.nml:1: the file is no text: it has bytes that are 0')
       if (.not. allocated(error)) call expect_faults(error, '&case t_end = 1 /'//char(13)//'! x'//char(13), &

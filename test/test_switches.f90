@@ -190,15 +190,15 @@ contains
       call new_load_regime(regime, scene%loads, 0.3_wp, 1.0_wp, 2)
       call check(error, .not. regime%on_spacecraft, 'a pulse that acts after')
       if (allocated(error)) return
-      call compile(scene, "&load law = 'table', times = 0, 0.3, "//after_0_3//', 1, values = 1, 1, 2, 2 /', error)
+      call check_jump(after_0_3, error)
+      if (.not. allocated(error)) call check_jump('0.3', error)
       if (allocated(error)) return
-      call check(error, size(scene%switches), 1, 'switches of a table that jumps')
+      call compile(scene, "&load law = 'table', times = 2*0.2, 2*0.6, values = 0, 2*5, 0 /", error) ! a pulse
       if (allocated(error)) return
-      call new_load_regime(regime, scene%loads, 0.0_wp, 0.3_wp, 2)
-      call check_close(error, regime%constant_base, [0.0_wp, 0.0_wp, 1.0_wp], 0.0_wp, 'before the jump')
+      call check(error, size(scene%switches), 2, 'switches of a pulse')
       if (allocated(error)) return
-      call new_load_regime(regime, scene%loads, 0.3_wp, 1.0_wp, 2)
-      call check_close(error, regime%constant_base, [0.0_wp, 0.0_wp, 2.0_wp], 0.0_wp, 'after the jump')
+      call new_load_regime(regime, scene%loads, 0.2_wp, 0.6_wp, 2)
+      call check_close(error, regime%constant_base, [0.0_wp, 0.0_wp, 5.0_wp], 0.0_wp, 'within the pulse')
       if (allocated(error)) return
       call compile(scene, '&kink_program hinge = 0, t_start = 0.3, t_end = '//after_0_3//', value = 1 /', refusal)
       call check(error, refusal%message, &
@@ -212,6 +212,24 @@ contains
       call check(error, refusal%message, 'c.nml:4: &kink_program times = 0, 0.3, '//after_0_3//': must increase, but value 3, '// &
                  '0.300000, follows 0.300000 [s]', 'a spline')
    end subroutine test_short
+
+   !> A table that jumps from 1 to 2 at 0.3, or at the number after it.
+   subroutine check_jump(second, error)
+      character(len=*), intent(in) :: second !! of the two times
+      type(error_type), allocatable, intent(out) :: error
+      type(scene_type) :: scene
+      type(load_regime) :: regime
+
+      call compile(scene, "&load law = 'table', times = 0, 0.3, "//second//', 1, values = 1, 1, 2, 2 /', error)
+      if (allocated(error)) return
+      call check(error, size(scene%switches), 1, 'switches of a table that jumps')
+      if (allocated(error)) return
+      call new_load_regime(regime, scene%loads, 0.0_wp, 0.3_wp, 2)
+      call check_close(error, regime%constant_base, [0.0_wp, 0.0_wp, 1.0_wp], 0.0_wp, 'before the jump')
+      if (allocated(error)) return
+      call new_load_regime(regime, scene%loads, 0.3_wp, 1.0_wp, 2)
+      call check_close(error, regime%constant_base, [0.0_wp, 0.0_wp, 2.0_wp], 0.0_wp, 'after the jump')
+   end subroutine check_jump
 
    subroutine test_release(error)
       type(error_type), allocatable, intent(out) :: error

@@ -463,6 +463,66 @@ def test_loads_on_a_fixed_spacecraft_are_noted(tmp_path):
     assert "note    &load, number 1, never acts: the spacecraft is fixed" in rodyn("check", "case.nml", cwd=tmp_path).stdout
 
 
+def test_a_load_after_the_end_is_noted_with_and_without_an_end_of_its_own(tmp_path):
+    for end in ("", ", t_end = 4"):
+        for law in ("'constant'", "'smooth_step'"):
+            write_case(tmp_path, TIMES + SPACECRAFT + CHAIN + f"&load law = {law}, value = 5, t_start = 3{end} /\n")
+            result = rodyn("check", "case.nml", cwd=tmp_path)
+            assert result.stdout.splitlines()[1:] == [
+                "note    &load, number 1, never acts: it begins at t = 3 s, and the case ends at 0.05 s"], result.stderr
+    assert rodyn("run", "case.nml", cwd=tmp_path).returncode == 0
+    with h5py.File(tmp_path / "case.h5") as file:
+        (tmp_path / "again.nml").write_bytes(file.attrs["resolved_input"])
+    assert rodyn("check", "again.nml", cwd=tmp_path).returncode == 0
+
+
+def test_what_waits_for_a_held_hinge_is_noted(tmp_path):
+    hinges = "".join(f"&hinge hinge = {h}, held = .true., latch_angle = 0.1, release_after = {a} /\n" for h, a in ((1, 0), (2, 1)))
+    for release, count in (("", 2), (", release_time = 0.01", 0)):
+        write_case(tmp_path, TIMES + SPACECRAFT + CHAIN + hinges + f"&hinge hinge = 0, held = .true., latch_angle = 0{release} /\n")
+        notes = rodyn("check", "case.nml", cwd=tmp_path).stdout.splitlines()[1:]
+        assert notes == [f"note    &hinge, hinge {h + 1}, is never released: hinge {h} is held and so cannot latch" for h in range(count)]
+
+
+def test_a_program_is_linked_with_an_existing_build(tmp_path):
+    if not list(ROOT.glob("build/*/rodyn/librodyn.a")):
+        pytest.skip("no build beside the program")
+    source = ROOT / "test/library_example/app/main.f90"
+    subprocess.run([ROOT / "tools/link", source, "-o", "example"], cwd=tmp_path, check=True)
+    subprocess.run([tmp_path / "example", "one.h5"], cwd=tmp_path, check=True)
+    assert {path.name for path in tmp_path.iterdir()} == {"example", "one.h5"}
+    with h5py.File(tmp_path / "one.h5") as file:
+        assert file["phi"][-1, 0] != 0
+
+
+def test_a_loss_of_rounding_is_none(tmp_path):
+    """The face of a damped stop, met again long after, has -2e-21 J to give back, in a run of 100 J."""
+    write_case(tmp_path, """&case t_end = 2, n_outputs = 10 /
+        &spacecraft motion = 'fixed' /
+        &chain n_rods = 3, length = 1.2, mass_per_length = 1.7, node_mass = 1.6, hinge_stiffness = 13 /
+        &model bending = 'rigid' /
+        &initial phi = 1.2, -1.2, 1.2 /
+        &hinge hinge = 0, rest_angle = -0.2, lower_stop = 0, stop_stiffness = 630, stop_damping = 13 /
+        &hinge hinge = 1, rest_angle = 0.2, upper_stop = 0, stop_stiffness = 1800, stop_damping = 71 /
+        &hinge hinge = 2, rest_angle = -0.2, lower_stop = 0, stop_stiffness = 4800, stop_damping = 3.7 /
+        """)
+    result = rodyn("run", "case.nml", cwd=tmp_path)
+    printed = [float(line.split(", ")[-1].split()[0]) for line in result.stdout.splitlines() if line.startswith("event ")]
+    with xarray.open_dataset(tmp_path / "case.h5", group="events") as events:
+        lost = events.energy_lost.values
+    tiny = np.abs(lost) < 1e-15
+    assert np.any(lost[tiny] < 0) and not np.any(np.array(printed)[tiny])
+    np.testing.assert_allclose(np.array(printed)[~tiny], lost[~tiny], rtol=1e-3)
+
+
+def test_one_more_rod_is_singular(tmp_path):
+    write_case(tmp_path, "&case n_outputs = 300, t_end = 0.5 /\n" + SPACECRAFT
+               + "&chain n_rods = 2, length = 1.5, mass_per_length = 1.7, bending_stiffness = 1e4, hinge_stiffness = 4000 /\n"
+               + "&initial phi = 0.1 /\n")
+    result = rodyn("run", "case.nml", cwd=tmp_path)
+    assert "it would be better cut in two, as would one more rod\n" in result.stdout, result.stdout
+
+
 def test_what_hardly_can_be_meant_is_noted(tmp_path):
     text = (TIMES + SPACECRAFT + CHAIN + "&load component = 'M', value = 5, t_start = 2, t_end = 3 /\n&load component = 'X' , value = 0 /\n"
             + "&load component = 'Y', law = 'table', times = 0, 1, values = 0, 0 /\n" + MOMENT

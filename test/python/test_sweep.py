@@ -146,6 +146,21 @@ def test_keys_of_repeated_groups_are_axes(here, key, values, old, new):
         assert list(read.axes) == [key] and key.split("(")[0] in read.axis_label(key)
 
 
+def test_angles_of_axes_that_look_like_degrees_are_noted(here):
+    (here / "degrees.nml").write_text("&sweep base = 'base.nml' /\n&axis key = 'initial.phi', values = 45, 90 /\n"
+                                      "&axis key = 'chain.length', values = 45, 90 /\n")
+    done = subprocess.run([RODYN, "check", "degrees.nml"], cwd=here, capture_output=True, text=True)
+    assert done.stdout.splitlines()[1:] == [
+        "note    axis initial.phi = 45 rad is 7.161972 turns; if degrees were meant, write 0.785398"], done.stderr
+
+
+def test_a_refused_combination_shows_numbers_by_as_few_digits_as_they_have(here):
+    sweep(here, "&sweep base = 'base.nml' /\n&axis key = 'load(1).t_start', values = 0.05, 0.6000000000000001 /\n"
+          "&axis key = 'load(1).t_end', values = 0.3, 0.9 /", code=1)
+    (message,) = [text for text in opened(here).message.values.astype(str) if text]
+    assert "&load t_start = 0.6000000000000001: must not be after t_end = 0.300000 [s] of the same load" in message
+
+
 def test_a_hinge_is_held_or_not(here):
     (here / "base.nml").write_text(MOVING.replace(", release_time = 0.1", ""))
     sweep(here, "&sweep base = 'base.nml' /\n&axis key = 'hinge(2).held', text_values = '.true.', '.false.' /")

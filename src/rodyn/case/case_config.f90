@@ -88,7 +88,7 @@ module rodyn_case_config
       real(wp) :: value = 0.0_wp                          !! amplitude [N] or [N m]
       real(wp) :: rate = 0.0_wp                           !! of sine_squared [rad/s]
       real(wp) :: rise_time = 0.0_wp                      !! of smooth_step [s]; 0: t_end - t_start
-      real(wp), allocatable :: times(:)                   !! of table, increasing [s]
+      real(wp), allocatable :: times(:)                   !! of table, increasing; two equal ones: a jump [s]
       real(wp), allocatable :: values(:)                  !! of table [N] or [N m]
       character(len=name_length) :: after = 'zero'        !! of table, beyond its last time: 'zero' or 'hold'
    end type load_config

@@ -313,21 +313,24 @@ contains
       class(key_judge), intent(inout) :: judge
       integer, intent(in) :: i
       type(load_config), intent(in) :: load
+      character(len=:), allocatable :: whose !! t_end this is
 
       if (.not. (judge%is_sound('load', i, 't_start') .and. judge%is_sound('load', i, 't_end'))) return
       if (.not. judge%is_given('load', i, 't_end') .and. .not. judge%is_sound('case', 1, 't_end')) return
+      whose = ' of the same load'
+      if (.not. judge%is_given('load', i, 't_end')) whose = ', with t_end of &case'
       if (load%t_start > load%t_end .and. .not. same_time(load%t_start, load%t_end)) then
          if (judge%is_given('load', i, 't_start')) then
-            call judge%blame('load', i, 't_start', 'must not be after t_end = '//short_text(load%t_end)//' [s]')
+            call judge%blame('load', i, 't_start', 'must not be after t_end = '//short_text(load%t_end)//' [s] of the same load')
          else
-            call judge%blame('load', i, 't_end', 'must not be before t_start = '//short_text(load%t_start)//' [s]')
+            call judge%blame('load', i, 't_end', 'must not be before t_start = '//short_text(load%t_start)//' [s] of the same load')
          end if
       else if (load%law == 'smooth_step' .and. judge%is_sound('load', i, 'rise_time') .and. &
                judge%is_sound('load', i, 'law')) then
          if (load%t_start + load%rise_time > load%t_end .and. &
              .not. same_time(load%t_start + load%rise_time, load%t_end)) then
             call judge%blame('load', i, 'rise_time', 'must not exceed t_end - t_start = ' &
-               //short_text(load%t_end - load%t_start)//' [s]')
+               //short_text(load%t_end - load%t_start)//' [s]'//whose)
          else if (.not. load%rise_time > 0.0_wp) then
             call judge%blame('load', i, 'rise_time', 'must be positive, but t_end = t_start [s]')
          end if

@@ -132,7 +132,7 @@ module rodyn_case_schema
       schema_row('load', 'rise_time', type_real, unit='s', default='depends', rule=positive, &
          when="law = 'smooth_step'; default: t_end - t_start", help='duration of the rise from 0 to value'), &
       schema_row('load', 'times', type_real, any_list, 's', 'depends', &
-         when="required when law = 'table'", help='increasing times, two at least'), &
+         when="required when law = 'table'", help='increasing times, two at least; two equal ones make a jump'), &
       schema_row('load', 'values', type_real, any_list, 'N or N m', 'depends', &
          when="required when law = 'table'", help='value at each of the times, linear in between'), &
       schema_row('load', 'after', type_word, default='depends', words='zero|hold', &

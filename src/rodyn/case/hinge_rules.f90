@@ -6,6 +6,7 @@ module rodyn_hinge_rules
    use rodyn_key_judge, only: key_judge, no_such
    use rodyn_law_rules, only: check_law_keys, check_table
    use rodyn_switch_times, only: same_time
+   use rodyn_text, only: short_text
    implicit none (type, external)
    private
    public :: check_moving_hinges
@@ -61,7 +62,8 @@ contains
       if (.not. (judge%is_sound('kink_program', i, 't_start') .and. judge%is_sound('kink_program', i, 't_end'))) return
       if (.not. judge%is_given('kink_program', i, 't_end') .and. .not. judge%is_sound('case', 1, 't_end')) return
       if (program%t_start > program%t_end .and. .not. same_time(program%t_start, program%t_end)) then
-         call judge%blame('kink_program', i, 't_start', 'must not be after t_end')
+         call judge%blame('kink_program', i, 't_start', 'must not be after t_end = '//short_text(program%t_end)// &
+                          ' [s] of the same program')
       else if (same_time(program%t_start, program%t_end) .and. program%law /= 'ramp') then
          call judge%blame('kink_program', i, 't_start', "must be before t_end; only law = 'ramp' may be a step")
       end if

@@ -35,7 +35,8 @@ contains
       end do
    end subroutine check_law_keys
 
-   !> As many values as times, two at least, and times that increase: of a spline by more than rounding.
+   !> As many values as times, two at least, and times that increase: of a spline by more than rounding; of a load two may be
+   !> equal, where it jumps, but not three.
    subroutine check_table(judge, group, i, times, values, spline)
       class(key_judge), intent(inout) :: judge
       character(len=*), intent(in) :: group
@@ -43,19 +44,36 @@ contains
       real(wp), allocatable, intent(in) :: times(:)  !! [s]
       real(wp), allocatable, intent(in) :: values(:) !! both allocated where they are given rightly
       logical, intent(in) :: spline !! smooth at its times; a load may jump there
+      character(len=:), allocatable :: rule
       integer :: k
 
       if (.not. gives(judge, group, i, 'times')) return
       if (size(times) < 2) call judge%blame(group, i, 'times', 'must be two values at least')
       do k = 2, size(times)
-         if (times(k) > times(k - 1) .and. .not. (spline .and. same_time(times(k), times(k - 1)))) cycle
-         call judge%blame(group, i, 'times', 'must increase, but value '//to_text(k)//', '//short_text(times(k))// &
-                    ', follows '//short_text(times(k - 1))//' [s]')
+         if (follows(k)) cycle
+         rule = 'must increase, but value '
+         if (.not. spline) rule = 'must increase, or jump at two equal times, but value '
+         call judge%blame(group, i, 'times', rule//to_text(k)//', '//short_text(times(k))//', follows '// &
+                          short_text(times(k - 1))//' [s]')
          exit
       end do
       if (.not. gives(judge, group, i, 'values')) return
       if (size(values) /= size(times)) call judge%blame(group, i, 'values', 'must be as many as times: '// &
                                                   to_text(size(times))//', not '//to_text(size(values)))
+
+   contains
+
+      !> May time k stand behind those before it?
+      pure logical function follows(k)
+         integer, intent(in) :: k
+         if (spline) then
+            follows = times(k) > times(k - 1) .and. .not. same_time(times(k), times(k - 1))
+         else
+            follows = times(k) >= times(k - 1)
+            if (k > 2) follows = follows .and. times(k) > times(k - 2)
+         end if
+      end function follows
+
    end subroutine check_table
 
    !> Is a key given, and rightly?

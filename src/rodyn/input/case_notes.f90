@@ -2,14 +2,14 @@
 !> errors are not what the tolerances seem to say.
 module rodyn_case_notes
    use rodyn_kinds, only: wp
-   use rodyn_case_config, only: case_config, none_given
+   use rodyn_case_config, only: case_config, hinge_config, none_given
    use rodyn_kink_program, only: kink_set, new_kink_set
    use rodyn_loads, only: is_zero, load_set, new_load_set
    use rodyn_switch_times, only: same_time
    use rodyn_text, only: formatted, tidy, to_text
    implicit none (type, external)
    private
-   public :: case_notes, joined_lines
+   public :: case_notes, degrees_note, joined_lines
 
    character(len=1), parameter :: nl = new_line('a')
    real(wp), parameter :: pi = acos(-1.0_wp)
@@ -99,15 +99,36 @@ contains
          end associate
          if (len(why) > 0) call add(text, '&kink_program, number '//to_text(i)//', moves nothing: '//why)
       end do
-      if (.not. allocated(config%hinges)) return
-      do i = 1, size(config%hinges)
-         associate (t => config%hinges(i)%release_time)
-            if ((t > config%t_end .or. same_time(t, config%t_end)) .and. t < none_given) &
-               call add(text, '&hinge, hinge '//to_text(config%hinges(i)%hinge)//', is never released: release_time = '// &
-                        number(t)//' s is not before the end of the case, '//number(config%t_end)//' s')
-         end associate
-      end do
+      if (allocated(config%hinges)) call note_releases(config%hinges, config%t_end, text)
    end subroutine note_idle
+
+   !> Releases that do not come until t_end: too late, or by a latching of what stays held.
+   subroutine note_releases(hinges, t_end, text)
+      type(hinge_config), intent(in) :: hinges(:)
+      real(wp), intent(in) :: t_end !! [s]
+      character(len=:), allocatable, intent(inout) :: text
+      logical :: comes_free(size(hinges))
+      integer :: i, k
+
+      associate (t => hinges%release_time)
+         comes_free = .not. hinges%held .or. (t < t_end .and. .not. same_time(t, t_end))
+         do k = 1, size(hinges) ! along chains of hinges that release one another
+            do i = 1, size(hinges)
+               comes_free(i) = comes_free(i) .or. any(comes_free .and. hinges%hinge == hinges(i)%release_after)
+            end do
+         end do
+         do i = 1, size(hinges)
+            if (comes_free(i)) cycle
+            if (t(i) < none_given) then
+               call add(text, '&hinge, hinge '//to_text(hinges(i)%hinge)//', is never released: release_time = '// &
+                        number(t(i))//' s is not before the end of the case, '//number(t_end)//' s')
+            else if (hinges(i)%release_after >= 0) then
+               call add(text, '&hinge, hinge '//to_text(hinges(i)%hinge)//', is never released: hinge '// &
+                        to_text(hinges(i)%release_after)//' is held and so cannot latch')
+            end if
+         end do
+      end associate
+   end subroutine note_releases
 
    !> What makes a law in time vanish.
    pure function zero_of(law, value, table) result(why)
@@ -173,22 +194,30 @@ contains
       subroutine look(what, angles)
          character(len=*), intent(in) :: what
          real(wp), intent(in), optional :: angles(:)
-         integer :: k
+         character(len=:), allocatable :: note
 
          if (.not. present(angles)) return
-         do k = 1, size(angles)
-            if (.not. looks_like_degrees(angles(k))) cycle
-            call add(text, what//' = '//number(angles(k))//' rad is '// &
-                     number(abs(angles(k))/(2.0_wp*pi))//' turns; if degrees were meant, write '// &
-                     number(angles(k)*pi/180.0_wp))
-            return
-         end do
+         note = degrees_note(what, angles)
+         if (len(note) > 0) call add(text, note)
       end subroutine look
 
    end subroutine note_degrees
 
+   !> What there is to say of the first angle that looks like degrees; empty if none does.
+   pure function degrees_note(what, angles) result(note)
+      character(len=*), intent(in) :: what
+      real(wp), intent(in) :: angles(:) !! [rad]
+      character(len=:), allocatable :: note
+      integer :: k
+
+      note = ''
+      k = findloc(looks_like_degrees(angles), .true., 1)
+      if (k > 0) note = what//' = '//number(angles(k))//' rad is '//number(abs(angles(k))/(2.0_wp*pi))// &
+                        ' turns; if degrees were meant, write '//number(angles(k)*pi/180.0_wp)
+   end function degrees_note
+
    !> Beyond a turn, and a whole number of half degrees; nobody types such a number of radians.
-   pure logical function looks_like_degrees(angle)
+   elemental logical function looks_like_degrees(angle)
       real(wp), intent(in) :: angle
       real(wp), parameter :: largest = 3600.0_wp
       looks_like_degrees = abs(angle) > 2.0_wp*pi .and. abs(angle) <= largest

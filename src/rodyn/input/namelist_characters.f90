@@ -22,11 +22,16 @@ contains
       character(len=*), intent(in) :: text
       character(len=:), allocatable :: reason
       integer :: i, zeros
+      logical :: wide !! four bytes a character
 
       reason = ''
       zeros = 0
+      wide = .false.
       if (index(text, nul) > 0) zeros = count([(text(i:i) == nul, i=1, len(text))])
-      if (index(text, little_endian) == 1 .or. index(text, big_endian) == 1 .or. 5*zeros > 2*len(text)) then
+      if (zeros > 0) wide = index(text, little_endian//nul//nul) == 1 .or. index(text, nul//nul//big_endian) == 1
+      if (wide .or. 10*zeros > 7*len(text)) then
+         reason = 'the file is UTF-32 text; save it as UTF-8'
+      else if (index(text, little_endian) == 1 .or. index(text, big_endian) == 1 .or. 5*zeros > 2*len(text)) then
          reason = 'the file is UTF-16 text; save it as UTF-8'
       else if (zeros > 0) then
          reason = 'the file is no text: it has bytes that are 0'

@@ -147,7 +147,7 @@ contains
                 two_digits(100.0_wp*8.0_wp/3.0_wp*self%deflection_limit**2)//' % too long'
       end associate
       associate (others => count(self%rods%deflection > self%deflection_limit) - 1)
-         if (others > 0) text = text//', as are '//to_text(others)//' more rods'
+         if (others > 0) text = text//trim(merge(', as is ', ', as are', others == 1))//' '//more_rods(others)
       end associate
    end function deflection_warning
 
@@ -161,9 +161,16 @@ contains
              ' times its own first frequency ('//two_digits(self%rods(k)%own_frequency)// &
              ' rad/s, which one rod has 11 % too fast); it would be better cut in two'
       associate (others => count(vibration(self%rods, self%n_seen) > frequency_share) - 1)
-         if (others > 0) text = text//', as would '//to_text(others)//' more rods'
+         if (others > 0) text = text//', as would '//more_rods(others)
       end associate
    end function vibration_warning
+
+   pure function more_rods(n) result(text)
+      integer, intent(in) :: n
+      character(len=:), allocatable :: text
+      text = to_text(n)//' more rods'
+      if (n == 1) text = 'one more rod'
+   end function more_rods
 
    !> Frequency of the bending motion of a rod as a part of the rod's own; zero if it carries little energy.
    elemental real(wp) function vibration(rod, n)

@@ -3,7 +3,7 @@ module rodyn_command_line
    use rodyn_errors, only: error_type, raise, exit_done, exit_bad_input
    use rodyn_case_config, only: case_config
    use rodyn_case_reader, only: default_case, parse_case
-   use rodyn_case_notes, only: case_notes
+   use rodyn_case_notes, only: case_notes, degrees_note, joined_lines
    use rodyn_input_texts, only: input_texts, is_result_file, is_stream, read_input_texts
    use rodyn_launcher, only: direct_launch, launch_type
    use rodyn_modal_analysis, only: analyse_modes
@@ -208,10 +208,25 @@ contains
       end if
       if (allocated(error) .or. options%quiet) return
       name = name//': valid'
-      if (input%is_sweep) name = name//sweep%tried
+      if (input%is_sweep) name = name//sweep%tried//marked('note    ', sweep_notes(sweep))
       if (.not. input%is_sweep) name = name//marked('note    ', case_notes(config, .true.))
       call print_text(name, error)
    end subroutine check_command
+
+   !> Angles of a sweep, of its base and of its axes, that look like degrees.
+   function sweep_notes(sweep) result(text)
+      type(sweep_config), intent(in) :: sweep
+      character(len=:), allocatable :: text
+      integer :: i
+
+      text = case_notes(sweep%base_case, .false.)
+      do i = 1, size(sweep%axes)
+         associate (axis => sweep%axes(i))
+            if (axis%unit == 'rad' .and. .not. axis%textual) &
+               text = joined_lines(text, degrees_note('axis '//trim(axis%key), axis%numbers))
+         end associate
+      end do
+   end function sweep_notes
 
    !> Each line of a text on a new line and behind a mark.
    pure function marked(mark, text) result(lines)

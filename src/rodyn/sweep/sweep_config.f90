@@ -6,6 +6,7 @@
 module rodyn_sweep_config
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: case_config
+   use rodyn_case_values, only: plain_text
    use rodyn_namelist_document, only: namelist_document
    use rodyn_text, only: formatted, quoted, tidy, to_text
    implicit none (type, external)
@@ -81,14 +82,12 @@ contains
       type(sweep_axis), intent(in) :: axis
       integer, intent(in) :: row
       character(len=:), allocatable :: text
-      real(wp) :: x
-      integer :: stat
 
-      text = shown_value(axis, row)
-      if (axis%textual .or. axis%whole) return
-      read (text, *, iostat=stat) x
-      if (stat /= 0) x = huge(x)
-      if (abs(x - axis%numbers(row)) > 0.0_wp) text = value_text(axis, row)
+      if (axis%textual .or. axis%whole) then
+         text = value_text(axis, row)
+      else
+         text = plain_text(axis%numbers(row))
+      end if
    end function short_value_text
 
    !> Value `row` of an axis in namelist syntax.
