@@ -177,7 +177,7 @@ contains
       integer :: r
       do r = 1, size(case_rows)
          call check(error, group_index(case_groups, trim(case_rows(r)%group)) > 0 .and. &
-            len_trim(case_rows(r)%help) > 0, trim(case_rows(r)%key))
+            len_trim(case_rows(r)%help) > 0 .and. len_trim(case_rows(r)%help) < len(case_rows(r)%help), trim(case_rows(r)%key))
          if (allocated(error)) return
       end do
    end subroutine rows_are_sound

@@ -86,7 +86,7 @@ module rodyn_case_schema
       schema_row('model', 'kernel', type_word, default="'recursive'", words='recursive|assembled', &
          help='O(n) recursion, or the assembled system and LAPACK'), &
       schema_row('model', 'deflection_limit', type_real, default='0.06', rule=positive, &
-         help='a run ends with a warning if a rod bends by more than this part of its length; its chord is then 1 % too long'), &
+         help='a run warns if a rod bends by more than this part of its length; its chord is then 1 % too long'), &
       schema_row('initial', 'phi', type_real, rods, 'rad', '0.0', &
          help='angle of each chord from the moving x axis'), &
       schema_row('initial', 'alpha', type_real, rods, 'rad', '0.0', &
@@ -187,7 +187,7 @@ module rodyn_case_schema
       schema_row('hinge', 'friction_velocity', type_real, unit='rad/s', default='depends', rule=positive, &
          when='required when friction_moment > 0', help='rate up to which friction grows linearly'), &
       schema_row('solver', 'method', type_word, default="'auto'", words='auto|adams|bdf|erk|dop853|gauss', &
-         help='auto chooses; gauss, dop853: our own, orders 16 and 8; erk: ARKODE; adams, bdf: CVODE, errors add up'), &
+         help='auto chooses; gauss, dop853: our own, order 16 and 8; erk: ARKODE; adams, bdf: CVODE, errors add up'), &
       schema_row('solver', 'rtol', type_real, default='1.0e-8', rule=between, low=0.0_wp, high=1.0_wp, &
          help='relative tolerance'), &
       schema_row('solver', 'atol', type_real, default='1.0e-10', rule=positive, &
