@@ -149,6 +149,15 @@ def test_where_there_is_no_equilibrium_that_is_said(tmp_path):
     assert result.returncode == 1 and "a load or a kink varies in time" in result.stderr
 
 
+@pytest.mark.parametrize("spacecraft", [SPACECRAFT, FIXED])
+@pytest.mark.parametrize("stiffness", ["0", "100, 0"])
+def test_free_links_at_rest_are_an_equilibrium(spacecraft, stiffness, tmp_path):
+    """Whatever stiffness is missing: the forces are zero."""
+    links = f"&chain n_rods = 2, length = 1, mass_per_length = 1, hinge_stiffness = {stiffness} /\n&model bending = 'rigid' /\n"
+    data = modes_of(tmp_path, spacecraft + links, "--equilibrium")
+    assert data.attrs["at"] == "equilibrium" and abs(data.state).max() == 0
+
+
 def test_loads_act_on_request(tmp_path):
     plain = modes_of(tmp_path, SCENES["no ledger"])
     loaded = modes_of(tmp_path, SCENES["no ledger"], "--loads")

@@ -140,7 +140,7 @@ contains
          do i = 1, most_steps
             call factorise(solver, motion, y, 0.0_wp, ok)
             singular = .not. ok
-            if (singular) call factorise(solver, motion, y, light_drag*solver%fastest, ok)
+            if (singular) call factorise(solver, motion, y, light_drag*merge(solver%fastest, 1.0_wp, solver%fastest > 0.0_wp), ok)
             if (ok) call newton_step(solver, motion, step, ok)
             if (ok .and. singular) ok = maxval(abs(step)) <= close_enough
             if (singular .and. .not. ok) &
