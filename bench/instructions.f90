@@ -3,13 +3,14 @@
 !>     bench_instructions KIND TIMES
 !>
 !> KIND is rhs, rhs_rigid, rhs_lumped, lanes (eight right-hand sides), or run_dop853, run_gauss, run_adams, run_bdf (0.02 s
-!> of the article's table 1). The instructions of one are the difference between two TIMES (`instructions/guard.py`).
+!> of the article's table 1), which print the number of their right-hand sides. The instructions of one are the difference
+!> between two TIMES (`instructions/guard.py`).
 program bench_instructions
-   use rodyn_kinds, only: wp
+   use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type
    use rodyn_case_config, only: case_config
    use rodyn_case_reader, only: read_case
-   use rodyn_integrator, only: integrator_type, solver_options
+   use rodyn_integrator, only: integrator_type, solver_options, solver_statistics
    use rodyn_integrators, only: new_integrator
    use rodyn_lanes, only: lanes
    use rodyn_lapack, only: use_one_thread
@@ -21,6 +22,7 @@ program bench_instructions
    type(motion_type), target :: motion
    real(wp), allocatable :: y(:)
    integer :: times, i
+   integer(i8) :: n_rhs
 
    call use_one_thread()
    call get_command_argument(1, kind)
@@ -30,9 +32,11 @@ program bench_instructions
    if (kind == 'lanes') then
       call evaluate_lanes()
    else if (kind(1:4) == 'run_') then
+      n_rhs = 0
       do i = 1, times
          call run(trim(kind(5:)))
       end do
+      print '(i0, a)', n_rhs, ' right-hand sides'
    else
       call evaluate()
    end if
@@ -85,6 +89,7 @@ contains
       character(len=*), intent(in) :: method
       class(integrator_type), allocatable :: integrator
       type(solver_options) :: options
+      type(solver_statistics) :: stats
       type(error_type), allocatable :: error
       real(wp) :: final(size(y)), t
 
@@ -95,6 +100,8 @@ contains
       call integrator%start(0.0_wp, y, error)
       if (.not. allocated(error)) call integrator%advance(0.02_wp, final, t, error)
       if (allocated(error)) error stop error%message
+      stats = integrator%statistics()
+      n_rhs = n_rhs + stats%n_rhs
       call integrator%finalize()
    end subroutine run
 

@@ -3,7 +3,8 @@
     python bench/instructions/guard.py            exit 1 if anything takes over 1 % more than recorded
     python bench/instructions/guard.py --record   write the counts of this compiler into counts.json
 
-Instructions do not depend on what else the machine does, so a slow-down of 1 % shows in review where time would not.
+Instructions do not depend on what else the machine does, so a slow-down of 1 % shows in review where time would not. Those of
+runs are for a right-hand side: the number of steps follows from rounding, too (by some percent).
 They are counted by valgrind's callgrind (Debian: package valgrind), which knows no AVX-512: the program is built for
 x86-64-v3. Counts belong to a compiler version; one that is not in counts.json is only reported, with exit 3, and so is that
 valgrind is missing.
@@ -56,18 +57,19 @@ def build(prefix: str) -> str:
     return str(pathlib.Path(prefix) / "bench_instructions")
 
 
-def instructions(program: str, kind: str, times: int) -> int:
-    """Instructions of a whole process."""
+def instructions(program: str, kind: str, times: int) -> tuple[int, int]:
+    """Instructions of a whole process, and the right-hand sides of its runs; where it makes none, the calls."""
     text = command_output(
         "valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null", program, kind, str(times), OPENBLAS_NUM_THREADS="1"
     )
-    return int(re.search(r"Collected : (\d+)", text)[1])
+    calls = re.search(r"^(\d+) right-hand sides", text, re.MULTILINE)
+    return int(re.search(r"Collected : (\d+)", text)[1]), int(calls[1]) if calls else times
 
 
 def count(program: str, kind: str) -> float:
-    """Instructions of one call or run."""
-    few, many = KINDS[kind]
-    return (instructions(program, kind, many) - instructions(program, kind, few)) / (many - few)
+    """Instructions of one call; of runs those for a right-hand side, since the number of steps follows from rounding, too."""
+    (few, few_calls), (many, many_calls) = (instructions(program, kind, times) for times in KINDS[kind])
+    return (many - few) / (many_calls - few_calls)
 
 
 def main() -> int:
