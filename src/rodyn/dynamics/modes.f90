@@ -446,6 +446,7 @@ contains
       integer, allocatable :: unused(:)
       real(wp) :: norm, work_size(1), of_vectors(1)
       integer :: info, n, low, high, i
+      logical :: asked
 
       n = size(a, 1)
       allocate (re(n), im(n), vectors(n, n), left(n, n), doubt(n), balance(n), condition(n), unused(2*n))
@@ -454,11 +455,13 @@ contains
       allocate (work(int(work_size(1))))
       info = 0
       doubt = 0.0_wp
-      if (.not. with_vectors) then
+      asked = with_vectors
+      if (.not. asked) then
          copy = a
          call dgeev('N', 'N', n, copy, n, re, im, left, n, vectors, n, work, size(work), info)
+         if (info == 0) asked = minval(hypot(re, im)) <= slow*maxval(hypot(re, im))
       end if
-      if (with_vectors .or. (info == 0 .and. minval(hypot(re, im)) <= slow*maxval(hypot(re, im)))) then
+      if (asked) then
          call dgeevx('B', 'V', 'V', 'E', n, a, n, re, im, left, n, vectors, n, low, high, balance, norm, condition, of_vectors, &
                      work, size(work), unused, info)
          do i = 1, n
