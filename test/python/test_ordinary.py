@@ -3,6 +3,8 @@
 `ordinary_motions.json` is written by that formulation (bench/stability/multipliers), which shares nothing with the program:
 
     bench/stability/campaign.py --count 12 --store test/python/ordinary_motions.json
+
+with a line for each scene that a longer campaign has found wrong since.
 """
 
 import collections
@@ -57,6 +59,6 @@ def fault(scene, place):
 @pytest.mark.parametrize("family", FAMILIES)
 def test_ordinary_scenes_move_as_free_bodies_with_multipliers_do(family, tmp_path):
     scenes = [scene for scene in STORED if scene["family"] == family]
-    assert len(scenes) == 12
+    assert len(scenes) >= 12
     faults = {scene["seed"]: fault(scene, tmp_path) for scene in scenes}
     assert not any(faults.values()), "\n".join(f"{family} {seed}: {text}" for seed, text in faults.items() if text)
