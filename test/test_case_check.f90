@@ -5,6 +5,7 @@ module test_case_check
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type, raise, exit_bad_input
    use rodyn_case_config, only: case_config, hinge_config, kink_config, load_config, profile_config
+   use rodyn_case_check, only: sound_case
    use rodyn_case_reader, only: parse_case, resolved_case
    use rodyn_case_values, only: plain_text
    use rodyn_motion, only: motion_type, new_motion, initial_state
@@ -503,7 +504,8 @@ contains
       allocate (config%loads(1))
       config%loads(1)%law = 'smooth_step'
       config%loads(1)%value = 1.0_wp
-      call new_scene(scene, config, error, resolved)
+      call new_scene(scene, config, error)
+      if (.not. allocated(error)) call sound_case(config, resolved, error)
       if (allocated(error)) return
       call parse_case('&spacecraft mass = 100, inertia = 10 / &chain n_rods = 2, length = 1.5, 1, mass_per_length = 1,'// &
                       "bending_stiffness = 1e4, hinge_stiffness = 1, 2 / &load law = 'smooth_step', value = 1 /", 'c.nml', given, &

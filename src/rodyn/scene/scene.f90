@@ -104,12 +104,11 @@ contains
    end function rod
 
    !> Compile a case. Fails, exit code 2, with all faults that `rodyn check` would find in it, in the same words.
-   subroutine new_scene(scene, given, error, resolved)
+   subroutine new_scene(scene, given, error)
       type(scene_type), intent(out) :: scene
       type(case_config), intent(in) :: given
       type(error_type), allocatable, intent(out) :: error
-      type(case_config), intent(out), optional :: resolved !! the case with what is not given
-      type(case_config) :: config
+      type(case_config) :: config !! with what is not given
       integer :: k
 
       call sound_case(given, config, error)
@@ -136,7 +135,6 @@ contains
       scene%n_q = scene%n_dof + size(scene%hinges%relaxing)
       call new_load_set(scene%loads, config%loads)
       call collect_switches(scene, config%t_end)
-      if (present(resolved)) resolved = config
    end subroutine new_scene
 
    !> Switches of loads, kinks and releases. What is released at a switch is released then, to the last digit.
