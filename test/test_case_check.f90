@@ -557,7 +557,8 @@ contains
          program%value = 1.0_wp
          program%rate = 2.0_wp
       end associate
-      call new_scene(scene, config, error, resolved)
+      call new_scene(scene, config, error)
+      if (.not. allocated(error)) call sound_case(config, resolved, error)
       if (.not. allocated(error)) call check(error, resolved_case(resolved), resolved_case(of_file), 'values used')
    end subroutine test_words
 
