@@ -12,7 +12,7 @@ module rodyn_dop853_integrator
    use rodyn_ode, only: ode_system, n_quadratures
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, time_text
    use rodyn_event_search, only: find_event
-   use rodyn_dop853_step, only: n_stages, stages, add_increment, error_norm, quadrature_errors
+   use rodyn_dop853_step, only: n_stages, inner_options, stages, add_increment, error_norm, quadrature_errors
    use rodyn_quadrature_refinement, only: quadrature_refinement
    implicit none (type, external)
    private
@@ -24,6 +24,7 @@ module rodyn_dop853_integrator
       real(wp) :: t_lost = 0.0_wp        !! what rounding took from t so far [s]
       real(wp) :: t_before = 0.0_wp      !! its start [s]
       real(wp) :: h = 0.0_wp             !! next step [s]
+      type(solver_options) :: inner      !! tolerances of a step
       real(wp), allocatable :: y(:)      !! state at t (n_states)
       real(wp), allocatable :: lost(:)   !! what rounding took from y so far (n_states)
       real(wp), allocatable :: f(:)      !! rates at t
@@ -60,6 +61,7 @@ contains
       end if
       self%system => system
       self%options = options
+      self%inner = inner_options(options)
       associate (n => system%n_states)
          allocate (self%y(n), self%lost(n), self%f(n), self%y_before(n), self%f_before(n), self%k(n, n_stages), &
                    self%stage(n), self%increment(n), self%y_new(n), source=0.0_wp)
@@ -156,7 +158,7 @@ contains
          values = y(m + 1:) + self%increment(m + 1:)
          tolerance = self%system%quadrature_tolerance(options%rtol, options%atol, values)
          if (maxval(error) <= tolerance) return
-         call self%refinement%refine(self%system, t, y, t + h, options%rtol, options%atol, tolerance, &
+         call self%refinement%refine(self%system, t, y, t + h, self%inner%rtol, self%inner%atol, tolerance, &
                                      self%increment(m + 1:), error, self%counts%n_rhs, n_steps, ok)
          call self%count_as_steps(n_steps)
       end associate
@@ -203,7 +205,7 @@ contains
             ok = all(ieee_is_finite(self%y_new))
             norm = 0.0_wp
             if (ok .and. self%n_grid == 0) norm = error_norm(self%system%n_controlled, h, self%k(:self%system%n_controlled, :), &
-                                                    self%y, self%y_new, self%options%rtol, self%options%atol)
+                                                    self%y, self%y_new, self%inner%rtol, self%inner%atol)
             if (ok .and. norm <= 1.0_wp) call evaluate(self, t_new, self%y_new, self%stage, ok)
          end if
          if (.not. ok) norm = huge(1.0_wp) ! not finite: shorten by the most
@@ -318,7 +320,7 @@ contains
 
       associate (n => self%system%n_controlled, span => self%t_stop - self%t)
          if (span <= 0.0_wp) return
-         self%stage(:) = self%options%atol + self%options%rtol*abs(self%y)
+         self%stage(:) = self%inner%atol + self%inner%rtol*abs(self%y)
          d0 = norm2(self%y(:n)/self%stage(:n))/sqrt(real(n, wp))
          d1 = norm2(self%f(:n)/self%stage(:n))/sqrt(real(n, wp))
          h0 = 1.0e-6_wp

@@ -14,11 +14,11 @@ module rodyn_erk_integrator
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type, raise
    use rodyn_ode, only: ode_system, n_quadratures
-   use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, time_text
+   use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, stricter, time_text
    use rodyn_nvector, only: new_nvector, free_nvector, vector_content, content_of
    use rodyn_event_search, only: find_event
    use rodyn_quadrature_refinement, only: quadrature_refinement
-   use rodyn_sundials_base, only: callback_data, rhs_shim, weights_shim, quiet_handler, all_finite, raise_return_code, stricter
+   use rodyn_sundials_base, only: callback_data, rhs_shim, weights_shim, quiet_handler, all_finite, raise_return_code
    use fsundials_context_mod, only: FSUNContext_Create, FSUNContext_Free
    use fsundials_nvector_mod, only: N_Vector
    use farkode_mod, only: ARK_SUCCESS, ARK_TSTOP_RETURN, ARK_ONE_STEP, ARKODE_HEUN_EULER_2_1_2, &
@@ -33,7 +33,7 @@ module rodyn_erk_integrator
    public :: erk_integrator, new_erk_integrator, erk_tableau
 
    integer, parameter :: lowest_order = 2, highest_order = 8, default_order = 6
-   real(wp), parameter :: shorter = 0.7_wp !! steps than ARKODE would make with the user's tolerances
+   real(wp), parameter :: shorter = 0.56_wp !! steps than ARKODE would make with the user's tolerances
 
    !> struct ARKodeButcherTableMem of arkode_butcher.h
    type, bind(c) :: butcher_table
@@ -94,6 +94,7 @@ contains
       class(ode_system), target, intent(inout) :: system
       type(solver_options), intent(in) :: options
       type(error_type), allocatable, intent(out) :: error
+      type(solver_options) :: inner
 
       self%order = options%order
       if (self%order == 0) self%order = default_order
@@ -105,11 +106,9 @@ contains
       self%options = options
       allocate (self%data)
       self%data%system => system
-      ! Errors of a step add up from period to period of a vibration; with steps so much shorter they stay near those of `dop853`.
-      associate (factor => stricter(shorter, merge(8, self%order, self%order >= 7), options%rtol))
-         self%data%rtol = factor*options%rtol
-         self%data%atol = factor*options%atol
-      end associate
+      inner = stricter(options, shorter, merge(8, self%order, self%order >= 7))
+      self%data%rtol = inner%rtol
+      self%data%atol = inner%atol
       call check(error, FSUNContext_Create(c_null_ptr, self%context), 'SUNContext_Create')
       if (allocated(error)) return
       self%state => new_nvector(system%n_states, system%n_controlled, self%context)

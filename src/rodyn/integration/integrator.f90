@@ -19,7 +19,7 @@ module rodyn_integrator
    implicit none (type, external)
    private
    public :: integrator_type, solver_options, solver_statistics, monitor_type
-   public :: time_text, judged_steps, is_hopeless, hopeless_text
+   public :: stricter, time_text, judged_steps, is_hopeless, hopeless_text
 
    !> What the user chooses of a method.
    type :: solver_options
@@ -138,6 +138,23 @@ module rodyn_integrator
    real(wp), parameter :: hopeless = 1.0e12_wp     !! steps to the stop time: weeks for the smallest scene
 
 contains
+
+   !> Options with tolerances that make the steps shorter by a factor. A tolerance bounds the error of one step; those of all steps
+   !> add up, from one period of a vibration to the next. Each method says with which steps the error at the end stays below
+   !> 100 rtol in ordinary scenes (docs/stability.md). Not below what rounding allows.
+   pure function stricter(options, factor, power) result(inner)
+      type(solver_options), intent(in) :: options !! the user's
+      real(wp), intent(in) :: factor              !! of the steps, < 1
+      integer, intent(in) :: power                !! of the step in the error that is tested
+      type(solver_options) :: inner
+      real(wp), parameter :: least_rtol = 1.0e-13_wp
+      real(wp) :: share
+
+      share = max(factor**power, min(1.0_wp, least_rtol/options%rtol))
+      inner = options
+      inner%rtol = share*options%rtol
+      inner%atol = share*options%atol
+   end function stricter
 
    !> Never, unless a monitor says otherwise. When true, `advance` ends with exit code `exit_stopped`.
    function stop_requested(self) result(requested)

@@ -25,6 +25,7 @@ module rodyn_lane_dop853
    use rodyn_lane_ode, only: lane_system
    use rodyn_integrator, only: solver_options, solver_statistics, time_text, judged_steps, is_hopeless, hopeless_text
    use rodyn_text, only: to_text
+   use rodyn_dop853_step, only: inner_options
    use rodyn_dop853_nystrom, only: n_stages, node
    use rodyn_lane_dop853_sums, only: hopeless, turning_rates, stage_states, turning_stage, end_of_step, check_rates, &
       advance_states, advance_rates
@@ -140,11 +141,11 @@ contains
 
       call clear(self%course(lane))
       associate (course => self%course(lane))
-         course%options = options
+         course%options = inner_options(options)
          course%counts%last_order = 8
          course%t = t
-         self%rtol(lane) = options%rtol
-         self%atol(lane) = options%atol
+         self%rtol(lane) = course%options%rtol
+         self%atol(lane) = course%options%atol
          self%q_lost(lane, :) = 0.0_wp
          self%p_lost(lane, :) = 0.0_wp
          self%q(lane, :) = 0.0_wp

@@ -40,6 +40,7 @@ module rodyn_method_choice
    real(wp), parameter :: lasting = 150.0_wp       !! times the fastest decay that vibrations with dampers last
    real(wp), parameter :: short_run = 1500.0_wp    !! right-hand sides that are not worth a trial
    real(wp), parameter :: lead = 1.1_wp            !! by which an implicit method must be faster: it is less accurate
+   real(wp), parameter :: lead_over_events = 2.0_wp !! likewise where hinges may have events: after each it begins anew, at order 1
    real(wp), parameter :: even_lead = 1.2_wp       !! by which collocation must be ahead of explicit steps without a trial: these
                                                    !! gain more where loads are smooth and do not excite the fastest vibrations
 
@@ -56,7 +57,7 @@ contains
       logical, intent(in) :: out(size(candidates)) !! methods that are of no use
       real(wp), intent(in) :: most_trial !! effort that a trial may cost
       class(monitor_type), target, intent(inout), optional :: monitor !! of the run; what is chosen after a stop is of no use
-      real(wp) :: span, ratio, expected(n_even), forecast(size(candidates)), outputs(size(candidates))
+      real(wp) :: span, ratio, wanted, expected(n_even), forecast(size(candidates)), outputs(size(candidates))
       logical :: available(n_even)
       integer :: best, i
 
@@ -90,13 +91,14 @@ contains
       end associate
       if (.not. choice%conclusive) return
       choice%pace = span/minval(forecast(:n_even))
+      wanted = merge(lead_over_events, lead, motion%events%watches)
       forecast = forecast + outputs
-      forecast(:n_even) = forecast(:n_even)/lead
+      forecast(:n_even) = forecast(:n_even)/wanted
       best = minloc(forecast, dim=1)
       choice%tried = .true.
       choice%method = trim(candidates(best)%method)
       choice%options%order = candidates(best)%order
-      choice%advantage = min(forecast(1)*lead/forecast(best), 1.0e9_wp)
+      choice%advantage = min(forecast(1)*wanted/forecast(best), 1.0e9_wp)
    end subroutine choose_method
 
    !> The method that the case names.
@@ -204,7 +206,7 @@ contains
          phase = 8.0_wp*min(1.0_wp, (1.0e4_wp*options%rtol)**0.0625_wp)
          later = merge(12.0_wp, 18.0_wp, rates%decay > 10.0_wp*rates%frequency)
       else
-         phase = 3.0_wp*min(1.0_wp, (1.0e4_wp*options%rtol)**0.125_wp)
+         phase = 2.6_wp*min(1.0_wp, (1.0e4_wp*options%rtol)**0.125_wp)
          later = 5.5_wp
          if (rates%strongly_damped()) share = min(1.0_wp, share*(1.0e-3_wp/options%rtol)**0.08_wp) ! what dies out is seen longer
       end if

@@ -10,7 +10,7 @@ module rodyn_sundials_base
    use fsundials_nvector_mod, only: N_Vector
    implicit none (type, external)
    private
-   public :: callback_data, rhs_shim, weights_shim, quiet_handler, all_finite, raise_return_code, sundials_version, stricter
+   public :: callback_data, rhs_shim, weights_shim, quiet_handler, all_finite, raise_return_code, sundials_version
 
    !> What the callbacks find behind `user_data`.
    type :: callback_data
@@ -54,16 +54,6 @@ module rodyn_sundials_base
    end interface
 
 contains
-
-   !> The user's tolerances times this are the library's: as much as makes its steps shorter by a factor. Not below what
-   !> rounding allows.
-   pure real(wp) function stricter(shorter, power, rtol)
-      real(wp), intent(in) :: shorter !! < 1
-      integer, intent(in) :: power    !! of the step in the error that is tested
-      real(wp), intent(in) :: rtol    !! the user's
-      real(wp), parameter :: least_rtol = 1.0e-13_wp
-      stricter = max(shorter**power, min(1.0_wp, least_rtol/rtol))
-   end function stricter
 
    !> CVRhsFn and ARKRhsFn: 0 done, 1 recoverable (the step may be shortened).
    function rhs_shim(t, y, ydot, user_data) result(flag) bind(c)
