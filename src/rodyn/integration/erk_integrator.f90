@@ -51,6 +51,7 @@ module rodyn_erk_integrator
       real(wp), allocatable :: a(:, :)        !! (stages, stages): a(j, i) multiplies rate j in stage i
       real(wp), allocatable :: b(:), c(:)     !! (stages)
       real(wp), allocatable :: b_error(:)     !! less those of the embedded method (stages)
+      real(wp), allocatable :: b_doubt(:)     !! of a second look at errors of quadratures, see `second_look` (stages)
       real(wp), allocatable :: rates(:, :)    !! of the stages of an output step (n_states, stages)
       real(wp) :: t_before = 0.0_wp           !! start of the last internal step [s]
       real(wp), allocatable :: y_before(:)    !! state there (n_states)
@@ -189,12 +190,39 @@ contains
       if (allocated(error)) return
       call copy_table(address, self%a, self%b, self%c, self%b_error)
       self%b_error(:) = self%b - self%b_error
+      self%b_doubt = second_look(self%c, self%b_error)
       allocate (self%rates(self%system%n_states, size(self%b)))
       if (self%system%has_quadratures()) allocate (self%power(n_quadratures, size(self%b)), &
                                                    self%data%recent(n_quadratures, size(self%b)), source=0.0_wp)
       call check(error, FERKStepSetTable(self%memory, address), 'ERKStepSetTable')
       call FARKodeButcherTable_Free(address)
    end subroutine choose_table
+
+   !> Weights that, like given ones, are blind to polynomials up to some degree, but see others of higher degree: a divided
+   !> difference, orthogonal to the given weights and of their length. An error that these miss by chance is seen by those.
+   pure function second_look(c, weights) result(others)
+      real(wp), intent(in) :: c(:)       !! times of the stages, as shares of the step
+      real(wp), intent(in) :: weights(:)
+      real(wp) :: others(size(c))        !! 0 if there are none
+      logical :: distinct(size(c))
+      integer :: i, degree
+
+      degree = 0
+      do while (degree < size(c) .and. abs(sum(weights*c**degree)) < 1.0e-10_wp) ! 0**0 = 1
+         degree = degree + 1
+      end do
+      distinct = [(all(abs(c(:i - 1) - c(i)) > 1.0e-10_wp), i=1, size(c))]
+      others = 0.0_wp
+      if (count(distinct) < degree + 2) return
+      do i = size(c), 1, -1 ! of the last ones
+         if (count(distinct(i:)) > degree + 1) distinct(i) = .false.
+      end do
+      do i = 1, size(c)
+         if (distinct(i)) others(i) = 1.0_wp/product(c(i) - c, mask=distinct .and. abs(c(i) - c) > 0.0_wp)
+      end do
+      others = others - weights*(sum(others*weights)/sum(weights**2))
+      others = others*(norm2(weights)/norm2(others))
+   end function second_look
 
    !> Coefficients of the table of an order.
    subroutine erk_tableau(order, a, b, c, error)
@@ -440,7 +468,7 @@ contains
       integer :: j
 
       if (self%order < 7) then
-         error = abs(weighted(power, self%b_error))
+         error = max(abs(weighted(power, self%b_error)), abs(weighted(power, self%b_doubt)))
       else
          error = 0.0_wp
          do j = 1, size(even)
