@@ -36,6 +36,7 @@ module rodyn_gauss_integrator
    real(wp), parameter :: error_constant = 0.5_wp   !! of the error estimate, see `form_increment`
    real(wp), parameter :: regular = 0.25_wp         !! see `neglected`
    real(wp), parameter :: wanted_estimate = 0.05_wp, largest_estimate = 0.7_wp !! of the error, in tolerances
+   real(wp), parameter :: wanted_loss = 1.0_wp      !! of positions, in tolerances, see `lost_response`
    real(wp), parameter :: first_phase = 2.0_wp      !! fastest frequency times the first step
    real(wp), parameter :: typical_lambda = 0.14_wp  !! size of an eigenvalue of A
    real(wp), parameter :: smallest_phase = 0.4_wp  !! slower vibrations need no implicit treatment
@@ -55,6 +56,7 @@ module rodyn_gauss_integrator
       real(wp) :: h_a(s, s) = 0.0_wp         !! h A
       real(wp) :: h2_a2(s, s) = 0.0_wp       !! h^2 A^2
       logical :: coupled = .false.           !! dampers couple the modes in such steps
+      logical :: damped = .false.            !! dampers are fast in such steps
       type(modal_reply) :: modal             !! (1 + h A D + h^2 A^2 K)^-1 - 1 in modes
       real(wp) :: h_last = 0.0_wp            !! step that `ahead` extrapolates from [s]
       real(wp) :: ahead(s, s) = 0.0_wp       !! node values of that step to those of this one
@@ -445,6 +447,7 @@ contains
       self%now%h_a = h*self%rule%a
       self%now%h2_a2 = h**2*self%rule%a2
       self%now%coupled = self%modes%couples(1.0_wp/(typical_lambda*h))
+      self%now%damped = any(h*self%modes%damping(:self%modes%n) > 1.0_wp)
       call self%now%modal%prepare(self%rule, self%modes, h, self%now%coupled)
    end subroutine set_step
 
@@ -683,8 +686,30 @@ contains
          end do
       end associate
       if (self%mechanics%n_ignorable == 3) call turn_displacement(self, y)
-      if (present(estimate)) estimate = error_constant*self%now%h*neglected(sums)/sqrt(real(m, wp))
+      if (.not. present(estimate)) return
+      estimate = error_constant*self%now%h*neglected(sums)/sqrt(real(m, wp))
+      if (self%now%damped) estimate = max(estimate, wanted_estimate*(loss(self, y)/wanted_loss)**(17.0_wp/s))
    end subroutine form_increment
+
+   !> `lost_response` of the step: the estimate above knows nothing of it.
+   real(wp) function loss(self, y)
+      class(gauss_integrator), intent(inout) :: self
+      real(wp), intent(in) :: y(:)
+      integer :: i, j
+
+      associate (m => self%mechanics%n_dof, base => self%mechanics%n_ignorable, modes => self%modes)
+         call multiply(m, self%rule%coefficients, self%trial%smooth, self%guess)
+         call project(m - base, modes%n, modes%v, self%guess(:, base + 1:), self%modal)
+         self%rest(:modes%n) = 0.0_wp
+         do j = 1, m
+            do i = 1, modes%n
+               self%rest(i) = self%rest(i) + (modes%u(i, j)/(self%options%atol + self%options%rtol*abs(y(j))))**2
+            end do
+         end do
+         self%rest(:modes%n) = sqrt(self%rest(:modes%n)/m)
+         loss = modes%lost_response(self%now%h, self%modal, self%rest)
+      end associate
+   end function loss
 
    !> Coefficients of F in shifted Legendre polynomials, one polynomial to a lane.
    subroutine legendre_coefficients(self, coefficient)

@@ -36,6 +36,7 @@ module rodyn_stiff_modes
       procedure :: stiff_line
       procedure :: bound_coupling
       procedure :: couples
+      procedure :: lost_response
    end type stiff_modes
 
 contains
@@ -176,5 +177,31 @@ contains
          self%grips(k) = dot_product(self%grip(:self%n, k), self%work(:self%n))
       end do
    end subroutine grip_all
+
+   !> What a step of collocation loses of positions, in tolerances. A mode that gives way fast follows its force, q ~ v.N/omega^2,
+   !> and of that P_s, which vanishes at all nodes, is lost: order s instead of 2 s. The answer of q' = -r q + r P_s at the end of a
+   !> step is h r exp(-h r/2) i_s(h r/2), i_s a modified spherical Bessel function, which is close to exp(-s(s + 1)/(h r)).
+   pure real(wp) function lost_response(self, h, forces, reach)
+      class(stiff_modes), intent(in) :: self
+      real(wp), intent(in) :: h            !! [s]
+      real(wp), intent(in) :: forces(:, :) !! v.N of the modes, coefficients of P_0..P_7 (s, most)
+      real(wp), intent(in) :: reach(:)     !! |u_i| in tolerances of positions (most)
+      real(wp), dimension(4:7) :: square   ! of q, for each degree
+      real(wp) :: r, share, high, low
+      integer :: i
+
+      square = 0.0_wp
+      do i = 1, self%n
+         r = sqrt(self%omega_2(i))
+         if (self%damping(i) > r) r = self%omega_2(i)/self%damping(i)
+         if (.not. h*r > 1.0_wp) cycle ! 1e-31
+         share = exp(-real(s*(s + 1), wp)/(h*r))*reach(i)/self%omega_2(i)
+         square = square + (share*forces(5:8, i))**2
+      end do
+      high = square(7) + square(6)
+      low = square(5) + square(4)
+      lost_response = sqrt(high)
+      if (high < low) lost_response = lost_response*(high/low)**0.375_wp ! from degree 6.5 to 8
+   end function lost_response
 
 end module rodyn_stiff_modes
