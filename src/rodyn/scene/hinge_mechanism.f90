@@ -251,7 +251,7 @@ contains
             lost = 0.5_wp*self%stop_stiffness*self%face(i)**2
          end if
       case (part_friction)
-         if (self%locked) return ! what has latched sticks for good: one event
+         if (self%is_constrained()) return ! it sticks for good: one event
          kinds = between(was%slides, self%slides, kind_sticks, kind_slides)
       case default
          return
