@@ -13,6 +13,7 @@ module chain_motion
    type :: run_type
       type(chain_type) :: chain
       real(dp), allocatable :: y(:)
+      real(dp), allocatable :: from(:) !! angles of the joints before the last change, from 0
       real(dp) :: t = 0.0_dp, step = 0.0_dp, largest_drift = 0.0_dp
       integer :: columns = 7, steps = 0, n_events = 0
       logical :: watches = .false.
@@ -170,7 +171,7 @@ contains
       integer :: k
 
       worked = 0.0_dp
-      before = total(r)
+      call note(r, before)
       do k = 0, r%chain%s%n - 1
          associate (j => r%chain%joint(k))
             if (j%held .and. j%locked .and. j%release_time <= r%t*(1.0_dp + 1.0e-12_dp)) call release(r, k)
@@ -187,6 +188,16 @@ contains
       r%chain%joint(k)%held = .false.
       call event(r, k, kind_released)
    end subroutine release
+
+   !> What there is before a change.
+   subroutine note(r, energy)
+      type(run_type), intent(inout) :: r
+      real(dp), intent(out) :: energy
+      real(dp), dimension(0:r%chain%s%n - 1) :: th, rate
+      energy = total(r)
+      call joints_now(r, r%t, r%y, th, rate)
+      r%from = th
+   end subroutine note
 
    real(dp) function total(r)
       type(run_type), intent(inout) :: r
@@ -211,7 +222,7 @@ contains
       type(run_type), intent(inout) :: r
       real(dp), intent(inout) :: worked
       real(dp), dimension(0:r%chain%s%n - 1) :: th, rate
-      integer :: k, part, pass
+      integer :: k, part, pass, i
       logical :: changed
 
       do pass = 1, 50
@@ -219,7 +230,9 @@ contains
          call find_statics(r%chain)
          call joints_now(r, r%t, r%y, th, rate)
          do k = 0, r%chain%s%n - 1
-            do part = 1, 5
+            do i = 0, 4
+               part = 1 + i
+               if (latch_is_first(r%chain%joint(k), r%from(k), th(k))) part = 1 + mod(i + part_latch - 1, 5)
                if (r%chain%joint(k)%margin(part, r%t, th(k), rate(k)) >= 0.0_dp) cycle
                changed = .true.
                call change(r, k, part, th(k), rate(k), worked)
@@ -231,6 +244,16 @@ contains
       end do
       r%trouble = 'branches follow each other'
    end subroutine settle
+
+   !> Whether a joint that jumps meets its latch before it meets a stop.
+   pure logical function latch_is_first(joint, from, th)
+      type(joint_law), intent(in) :: joint
+      real(dp), intent(in) :: from, th
+      real(dp) :: face
+      face = merge(joint%stop(1), joint%stop(2), th < from)
+      latch_is_first = (joint%latch - from)*(joint%latch - th) < 0.0_dp .and. &
+                       (face >= none .or. abs(joint%latch - from) < abs(face - from))
+   end function latch_is_first
 
    subroutine change(r, k, part, th, rate, worked)
       type(run_type), intent(inout) :: r
@@ -441,7 +464,7 @@ contains
       t0 = r%t
       r%t = r%t + high*h
       r%y = at_high
-      before = total(r)
+      call note(r, before)
       worked = 0.0_dp
       call settle(r, worked)
       call book(r, before, worked)
