@@ -189,7 +189,7 @@ module rodyn_case_schema
       schema_row('solver', 'method', type_word, default="'auto'", words='auto|adams|bdf|erk|dop853|gauss', &
          help='auto chooses; gauss, dop853: our own, order 16 and 8; erk: ARKODE; adams, bdf: CVODE, errors add up'), &
       schema_row('solver', 'rtol', type_real, default='1.0e-8', rule=between, low=0.0_wp, high=1.0_wp, &
-         help='relative tolerance'), &
+         help='relative tolerance; at the end of a run errors may be up to 100 times that'), &
       schema_row('solver', 'atol', type_real, default='1.0e-10', rule=positive, &
          help='absolute tolerance of all states; zero would leave states at rest without a scale'), &
       schema_row('solver', 'order', type_integer, default='0', rule=in_range, low=0.0_wp, high=12.0_wp, &
