@@ -111,16 +111,22 @@ contains
       if (.not. (associated(self%state) .and. c_associated(self%memory))) call raise(error, 'CVodeCreate: out of memory')
    end subroutine new_cvode_integrator
 
-   !> What CVODE is given. Errors of `adams` and `bdf` in a vibration have the same sign from period to period.
+   !> What CVODE is given. Errors of `adams` and `bdf` in a vibration have the same sign from period to period; those of order 1 and 2
+   !> are of use only where vibrations are calm.
    pure type(solver_options) function inner_options(method, options)
       character(len=*), intent(in) :: method
       type(solver_options), intent(in) :: options
-      real(wp), parameter :: shorter_adams = 0.73_wp, shorter_bdf = 0.335_wp
+      real(wp) :: shorter
       integer :: order
 
       order = options%order
       if (order == 0) order = merge(highest_adams, highest_bdf, method == 'adams')
-      inner_options = stricter(options, merge(shorter_adams, shorter_bdf, method == 'adams'), order + 1)
+      if (method == 'adams') then
+         shorter = 0.73_wp
+      else
+         shorter = merge(0.335_wp, 0.52_wp, order > 2)
+      end if
+      inner_options = stricter(options, shorter, order + 1)
    end function inner_options
 
    !> First start, or exact restart: order one, no history.
