@@ -7,7 +7,7 @@ module test_held_modes
    use rodyn_lapack, only: dgeev
    use rodyn_linear_model, only: linear_model, new_linear_model
    use rodyn_locks, only: expansion_matrix, free_coordinates
-   use rodyn_modal_analysis, only: modes_at_start
+   use rodyn_modes_at_start, only: modes_at_start
    use rodyn_modes, only: mode_set, new_modes, mechanism, oscillation, rigid_body
    use rodyn_motion, only: motion_type, new_motion, initial_state
    use rodyn_scene, only: scene_type, new_scene

@@ -3,8 +3,9 @@ module test_integrators
    use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type, raise, exit_stopped
+   use rodyn_text, only: time_text
    use rodyn_ode, only: ode_system
-   use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, monitor_type, time_text
+   use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, monitor_type
    use rodyn_integrators, only: new_integrator, sundials_version
    use test_oscillators, only: oscillator, new_oscillator
    use test_testing, only: unittest, new_test, check, check_close

@@ -5,7 +5,7 @@ module test_rod_profiles
    use rodyn_case_config, only: case_config, profile_config
    use rodyn_case_reader, only: parse_case, resolved_case
    use rodyn_linear_model, only: linear_model
-   use rodyn_modal_analysis, only: modes_at_start
+   use rodyn_modes_at_start, only: modes_at_start
    use rodyn_modes, only: mode_set
    use rodyn_motion, only: motion_type, new_motion
    use rodyn_quadrature, only: gauss_rule, new_gauss_rule

@@ -7,9 +7,8 @@ module rodyn_bench_campaign_runs
    use rodyn_motion, only: motion_type, new_motion, initial_state, state_invariants
    use rodyn_kinematics, only: invariants_type
    use rodyn_integrator, only: solver_options, monitor_type
-   use rodyn_driver, only: driver_type, new_driver
+   use rodyn_driver, only: driver_type, new_driver, options_of
    use rodyn_simulation, only: observer_type, listed_times, simulate
-   use rodyn_run, only: options_of
    implicit none (type, external)
    private
    public :: run_result, run_campaign_case, empty_case, article_chain

@@ -4,8 +4,9 @@ module rodyn_bench_gragg_integrator
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type, raise
+   use rodyn_text, only: time_text
    use rodyn_ode, only: ode_system
-   use rodyn_integrator, only: integrator_type, solver_statistics, time_text
+   use rodyn_integrator, only: integrator_type, solver_statistics
    use rodyn_bench_extrapolation, only: smooth_system, extrapolated_step, order, evaluations
    implicit none (type, external)
    private

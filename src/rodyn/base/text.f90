@@ -5,7 +5,7 @@ module rodyn_text
    implicit none (type, external)
    private
    public :: lower, is_name, is_digit
-   public :: to_text, formatted, tidy, short_text, quoted, printable, as_utf8, ends_with
+   public :: to_text, formatted, tidy, short_text, time_text, quoted, printable, as_utf8, ends_with
    public :: edit_distance, word_count, has_word, word
 
    !> A number as the shortest text (integer), or with 17 significant digits (real), or as T or F.
@@ -237,5 +237,19 @@ contains
       if (number(last:last) == '.') last = last - 1
       text = number(:last)//number(exponent:)
    end function tidy
+
+   !> A time for a message: ten digits, no idle zeros.
+   pure function time_text(t) result(text)
+      real(wp), intent(in) :: t !! [s]
+      character(len=:), allocatable :: text
+
+      if (abs(t) >= 1.0e-3_wp .and. abs(t) < 1.0e6_wp) then
+         text = tidy(formatted(t, '(f0.10)'))
+      else if (abs(t) > 0.0_wp) then
+         text = tidy(formatted(t, '(es16.9)'))
+      else
+         text = '0'
+      end if
+   end function time_text
 
 end module rodyn_text

@@ -12,8 +12,7 @@
 module rodyn_hinge_events
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type, raise
-   use rodyn_text, only: to_text
-   use rodyn_integrator, only: time_text
+   use rodyn_text, only: to_text, time_text
    use rodyn_hinge_mechanism, only: hinge_mechanism, kind_names, kind_released, kind_latched, &
       part_spring, part_lower, part_upper, part_friction, part_latch
    use rodyn_hinge_law, only: hinge_law, hinge_state, initial_joints, openings

@@ -11,8 +11,9 @@ module rodyn_cvode_integrator
    use, intrinsic :: iso_c_binding, only: c_ptr, c_int, c_long, c_double, c_null_ptr, c_associated, c_loc, c_funloc
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type, raise
+   use rodyn_text, only: time_text
    use rodyn_ode, only: ode_system, n_quadratures
-   use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, stricter, time_text
+   use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, stricter
    use rodyn_event_search, only: find_event
    use rodyn_quadrature_history, only: quadrature_history
    use rodyn_nvector, only: new_nvector, free_nvector, vector_content, content_of

@@ -9,8 +9,9 @@ module rodyn_dop853_integrator
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type, raise
+   use rodyn_text, only: time_text
    use rodyn_ode, only: ode_system, n_quadratures
-   use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, time_text
+   use rodyn_integrator, only: integrator_type, solver_options, solver_statistics
    use rodyn_event_search, only: find_event
    use rodyn_dop853_step, only: n_stages, inner_options, stages, add_increment, error_norm, quadrature_errors
    use rodyn_quadrature_refinement, only: quadrature_refinement

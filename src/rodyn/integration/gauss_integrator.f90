@@ -17,9 +17,10 @@ module rodyn_gauss_integrator
    use rodyn_kinds, only: wp, i8
    use rodyn_lanes, only: s => lanes
    use rodyn_errors, only: error_type, raise
+   use rodyn_text, only: time_text
    use rodyn_ode, only: ode_system, mechanical_system, n_quadratures
    use rodyn_stiff_modes, only: stiff_modes
-   use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, time_text
+   use rodyn_integrator, only: integrator_type, solver_options, solver_statistics
    use rodyn_trigonometry, only: sine_cosine
    use rodyn_lane_algebra, only: apply, apply_one, multiply, project, expand, square_sums, straight_lines, &
       residual, add, accumulate, copy

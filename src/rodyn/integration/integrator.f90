@@ -15,11 +15,11 @@ module rodyn_integrator
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type, raise, exit_stopped
    use rodyn_ode, only: ode_system
-   use rodyn_text, only: formatted, tidy
+   use rodyn_text, only: time_text
    implicit none (type, external)
    private
    public :: integrator_type, solver_options, solver_statistics, monitor_type
-   public :: stricter, time_text, judged_steps, is_hopeless, hopeless_text
+   public :: stricter, judged_steps, is_hopeless, hopeless_text
 
    !> What the user chooses of a method.
    type :: solver_options
@@ -316,19 +316,5 @@ contains
       self%clock_report = now
       call self%monitor%report(t, self%n_steps)
    end subroutine look_at_clock
-
-   !> A time for a message: ten digits, no idle zeros.
-   pure function time_text(t) result(text)
-      real(wp), intent(in) :: t !! [s]
-      character(len=:), allocatable :: text
-
-      if (abs(t) >= 1.0e-3_wp .and. abs(t) < 1.0e6_wp) then
-         text = tidy(formatted(t, '(f0.10)'))
-      else if (abs(t) > 0.0_wp) then
-         text = tidy(formatted(t, '(es16.9)'))
-      else
-         text = '0'
-      end if
-   end function time_text
 
 end module rodyn_integrator

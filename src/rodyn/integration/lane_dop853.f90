@@ -23,8 +23,8 @@ module rodyn_lane_dop853
    use rodyn_lanes, only: lanes
    use rodyn_aligned_store, only: aligned_store
    use rodyn_lane_ode, only: lane_system
-   use rodyn_integrator, only: solver_options, solver_statistics, time_text, judged_steps, is_hopeless, hopeless_text
-   use rodyn_text, only: to_text
+   use rodyn_integrator, only: solver_options, solver_statistics, judged_steps, is_hopeless, hopeless_text
+   use rodyn_text, only: to_text, time_text
    use rodyn_dop853_step, only: inner_options
    use rodyn_dop853_nystrom, only: n_stages, node
    use rodyn_lane_dop853_sums, only: hopeless, turning_rates, stage_states, turning_stage, end_of_step, check_rates, &

@@ -4,8 +4,8 @@ module rodyn_sundials_base
       c_f_pointer, c_loc, c_associated
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type, raise
+   use rodyn_text, only: time_text
    use rodyn_ode, only: ode_system, n_quadratures
-   use rodyn_integrator, only: time_text
    use rodyn_nvector, only: vector_content, content_of
    use fsundials_nvector_mod, only: N_Vector
    implicit none (type, external)

@@ -11,9 +11,8 @@
 module rodyn_validity
    use rodyn_kinds, only: wp
    use rodyn_scene, only: scene_type
-   use rodyn_integrator, only: time_text
    use rodyn_run_file, only: run_row
-   use rodyn_text, only: to_text
+   use rodyn_text, only: to_text, time_text
    implicit none (type, external)
    private
    public :: validity_type, new_validity, greatest_deflection

@@ -1,18 +1,17 @@
 !> One case from its description to its modes: what `rodyn modes` does, and what a library user may call.
 module rodyn_modal_analysis
    use rodyn_kinds, only: wp
-   use rodyn_case_config, only: case_config, load_config
+   use rodyn_case_config, only: case_config
    use rodyn_case_check, only: sound_case
    use rodyn_case_notes, only: case_notes, joined_lines
    use rodyn_case_reader, only: resolved_case
-   use rodyn_equilibrium, only: find_equilibrium
    use rodyn_errors, only: error_type
    use rodyn_integrators, only: sundials_version
-   use rodyn_loads, only: new_load_set
-   use rodyn_linear_model, only: linear_model, new_linear_model
-   use rodyn_modes, only: mode_set, new_modes, rigid_body, mechanism, relaxation
+   use rodyn_linear_model, only: linear_model
+   use rodyn_modes, only: mode_set, rigid_body, mechanism, relaxation
+   use rodyn_modes_at_start, only: modes_at_start
    use rodyn_modes_file, only: write_modes
-   use rodyn_motion, only: motion_type, new_motion, initial_state
+   use rodyn_motion, only: motion_type, new_motion
    use rodyn_notes, only: notes_on
    use rodyn_result_file, only: check_output_path, provenance
    use rodyn_run_needs, only: check_memory, memory_of_scene, of_program
@@ -21,7 +20,7 @@ module rodyn_modal_analysis
    use rodyn_text, only: formatted, to_text
    implicit none (type, external)
    private
-   public :: analyse_modes, modes_at_start
+   public :: analyse_modes
 
    real(wp), parameter :: pi = acos(-1.0_wp)
    integer, parameter :: most_rows = 40 !! of the table on the terminal
@@ -71,30 +70,6 @@ contains
          'note    the initial state is no equilibrium: these are the modes of its equations held at t = 0; see --equilibrium')
       call print_line('file    '//path)
    end subroutine analyse_modes
-
-   !> Linear model and modes of a case at t = 0. Hinges have the laws that hold there: those that are held are locked.
-   subroutine modes_at_start(motion, config, equilibrium, loads, with_shapes, model, modes, error)
-      type(motion_type), intent(inout) :: motion !! without a ledger
-      type(case_config), intent(in) :: config
-      logical, intent(in) :: equilibrium, loads, with_shapes
-      type(linear_model), intent(out) :: model
-      type(mode_set), intent(out) :: modes
-      type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: y(:)
-
-      if (.not. (loads .or. equilibrium)) call new_load_set(motion%dynamics%scene%loads, [load_config ::])
-      call motion%dynamics%set_regime(0.0_wp, minval([motion%dynamics%scene%switches, config%t_end]))
-      call initial_state(motion, config%initial, y)
-      if (motion%events%watches) then
-         associate (r => motion%n_q, m => motion%n_dof)
-            call motion%events%begin(motion%dynamics, y(1:r), y(r + 1:r + m), error)
-         end associate
-         if (allocated(error)) return
-      end if
-      if (equilibrium) call find_equilibrium(motion, 0.0_wp, y, error)
-      if (.not. allocated(error)) call new_linear_model(model, motion, 0.0_wp, y, error)
-      if (.not. allocated(error)) call new_modes(modes, model, with_shapes, error)
-   end subroutine modes_at_start
 
    !> One line for each mode, as far as there is room.
    subroutine print_table(modes)

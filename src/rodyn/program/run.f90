@@ -2,7 +2,7 @@
 module rodyn_run
    use rodyn_kinds, only: wp, i8
    use rodyn_terminal, only: print_line
-   use rodyn_text, only: formatted, to_text
+   use rodyn_text, only: formatted, to_text, time_text
    use rodyn_errors, only: error_type, raise, exit_stopped
    use rodyn_case_config, only: case_config
    use rodyn_case_check, only: sound_case
@@ -11,10 +11,10 @@ module rodyn_run
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_motion, only: motion_type, new_motion, initial_state, state_invariants
    use rodyn_kinematics, only: invariants_type
-   use rodyn_integrator, only: solver_options, solver_statistics, time_text
+   use rodyn_integrator, only: solver_statistics
    use rodyn_integrators, only: sundials_version
    use rodyn_lapack, only: use_one_thread
-   use rodyn_driver, only: driver_type, new_driver
+   use rodyn_driver, only: driver_type, new_driver, options_of
    use rodyn_simulation, only: observer_type, even_times, simulate
    use rodyn_ledger, only: fill_row
    use rodyn_run_needs, only: check_needs
@@ -28,7 +28,7 @@ module rodyn_run
    use rodyn_validity, only: validity_type, new_validity
    implicit none (type, external)
    private
-   public :: run_case, check_steps, options_of
+   public :: run_case, check_steps
 
    !> Takes rows down into the run file.
    type, extends(observer_type) :: recorder_type
@@ -184,17 +184,6 @@ contains
       call self%validity%observe(self%row)
       call self%file%append(self%row, error)
    end subroutine observe
-
-   !> The user's choices, for the integrator.
-   function options_of(config) result(options)
-      type(case_config), intent(in) :: config
-      type(solver_options) :: options
-      associate (solver => config%solver)
-         options = solver_options(rtol=solver%rtol, atol=solver%atol, order=solver%order, max_step=solver%max_step, &
-                                  fixed_step=solver%fixed_step, allow_unstable=solver%allow_unstable, &
-                                  max_steps=solver%max_steps)
-      end associate
-   end function options_of
 
    !> Attributes of the solver, status, and the final name.
    subroutine close_file(recorder, driver, motion, config, failure, seconds, error)

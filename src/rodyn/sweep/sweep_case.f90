@@ -7,17 +7,16 @@ module rodyn_sweep_case
    use rodyn_case_config, only: case_config
    use rodyn_case_reader, only: case_from_document
    use rodyn_errors, only: error_type, raise, exit_stopped
-   use rodyn_driver, only: driver_type, new_driver
+   use rodyn_driver, only: driver_type, new_driver, options_of
    use rodyn_integrator, only: monitor_type, solver_statistics
    use rodyn_ledger, only: fill_row
    use rodyn_linear_model, only: linear_model
-   use rodyn_modal_analysis, only: modes_at_start
+   use rodyn_modes_at_start, only: modes_at_start
    use rodyn_modes, only: mode_set
    use rodyn_motion, only: motion_type, new_motion, initial_state
    use rodyn_namelist_document, only: namelist_document
    use rodyn_namelist_edit, only: set_value
    use rodyn_rod_profile, only: mean_mass_factors
-   use rodyn_run, only: options_of
    use rodyn_run_file, only: run_row, new_run_row
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_switch_times, only: same_time

@@ -5,7 +5,8 @@
 module rodyn_ensemble
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type, raise, exit_stopped
-   use rodyn_integrator, only: solver_options, solver_statistics, time_text
+   use rodyn_text, only: time_text
+   use rodyn_integrator, only: solver_options, solver_statistics
    use rodyn_lanes, only: lanes
    use rodyn_lane_dop853, only: lane_dop853, new_lane_dop853, at_nothing, at_output, at_stop, at_failure
    use rodyn_lane_motion, only: lane_motion, new_lane_motion

@@ -2,8 +2,9 @@
 module rodyn_simulation
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type, raise
+   use rodyn_text, only: time_text
    use rodyn_motion, only: motion_type
-   use rodyn_integrator, only: integrator_type, time_text
+   use rodyn_integrator, only: integrator_type
    use rodyn_switch_times, only: interval_ends, same_time
    implicit none (type, external)
    private

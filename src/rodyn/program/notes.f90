@@ -5,8 +5,7 @@ module rodyn_notes
    use rodyn_scene, only: scene_type
    use rodyn_frequencies, only: natural_frequencies
    use rodyn_switch_times, only: same_time
-   use rodyn_text, only: to_text, formatted
-   use rodyn_integrator, only: time_text
+   use rodyn_text, only: to_text, formatted, time_text
    implicit none (type, external)
    private
    public :: notes_on, neglected_damping

@@ -1,9 +1,9 @@
 !> A few lines on what a scene uses and what it skips, for the terminal.
 module rodyn_description
    use rodyn_kinds, only: wp
+   use rodyn_text, only: time_text
    use rodyn_scene, only: scene_type
    use rodyn_switch_times, only: same_time
-   use rodyn_integrator, only: time_text
    implicit none (type, external)
    private
    public :: describe_scene

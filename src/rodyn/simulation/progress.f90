@@ -3,9 +3,9 @@ module rodyn_progress
    use, intrinsic :: iso_fortran_env, only: error_unit
    use, intrinsic :: iso_c_binding, only: c_int
    use rodyn_kinds, only: wp, i8
-   use rodyn_text, only: formatted
+   use rodyn_text, only: formatted, time_text
    use rodyn_posix_files, only: is_stop_asked
-   use rodyn_integrator, only: monitor_type, time_text
+   use rodyn_integrator, only: monitor_type
    implicit none (type, external)
    private
    public :: progress_monitor, new_progress, progress_line, duration_text, is_terminal

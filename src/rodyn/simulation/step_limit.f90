@@ -7,9 +7,10 @@
 module rodyn_step_limit
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type, raise, exit_bad_input
+   use rodyn_text, only: time_text
    use rodyn_scene, only: scene_type
    use rodyn_switch_times, only: interval_ends
-   use rodyn_integrator, only: solver_options, time_text
+   use rodyn_integrator, only: solver_options
    use rodyn_stability_function, only: stability_function, stability_function_of
    use rodyn_fast_eigenvalues, only: fast_eigenvalues
    implicit none (type, external)

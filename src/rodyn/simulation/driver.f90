@@ -11,7 +11,9 @@ module rodyn_driver
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type, exit_stopped
-   use rodyn_integrator, only: integrator_type, monitor_type, solver_options, solver_statistics, time_text
+   use rodyn_case_config, only: case_config
+   use rodyn_text, only: time_text
+   use rodyn_integrator, only: integrator_type, monitor_type, solver_options, solver_statistics
    use rodyn_integrators, only: new_integrator
    use rodyn_method_choice, only: method_choice, choose_method, named_method
    use rodyn_method_trial, only: candidates, effort_of, explicit_step, n_even
@@ -19,7 +21,7 @@ module rodyn_driver
    use rodyn_step_limit, only: check_fixed_step
    implicit none (type, external)
    private
-   public :: driver_type, new_driver
+   public :: driver_type, new_driver, options_of
 
    real(wp), parameter :: probation = 1500.0_wp   !! right-hand sides of explicit steps that are not worth a choice
    real(wp), parameter :: short_probation = 300.0_wp !! likewise where it is known already: what BDF needs to get going
@@ -604,5 +606,16 @@ contains
       end do
       nullify (self%motion, self%monitor)
    end subroutine finalize
+
+   !> The user's choices, for the integrator.
+   function options_of(config) result(options)
+      type(case_config), intent(in) :: config
+      type(solver_options) :: options
+      associate (solver => config%solver)
+         options = solver_options(rtol=solver%rtol, atol=solver%atol, order=solver%order, max_step=solver%max_step, &
+                                  fixed_step=solver%fixed_step, allow_unstable=solver%allow_unstable, &
+                                  max_steps=solver%max_steps)
+      end associate
+   end function options_of
 
 end module rodyn_driver

@@ -8,12 +8,12 @@
 !> the methods are tried on the beginning of the run.
 module rodyn_method_choice
    use rodyn_kinds, only: wp
-   use rodyn_text, only: to_text, formatted
+   use rodyn_text, only: to_text, formatted, time_text
    use rodyn_motion, only: motion_type
    use rodyn_scene, only: scene_type
    use rodyn_scene_modes, only: most_dof
    use rodyn_fastest_rates, only: fastest_rates, with_rigid_rods
-   use rodyn_integrator, only: monitor_type, solver_options, time_text
+   use rodyn_integrator, only: monitor_type, solver_options
    use rodyn_method_trial, only: fast_rates, candidates, n_even, effort_of_nodes, effort_of_modes, effort_of_step, &
       effort_of_coupling, effort_of_output, explicit_step, try_methods
    implicit none (type, external)
