@@ -1,7 +1,7 @@
 !> What a third bending shape buys: natural frequencies of a clamped-free uniform beam cut into N rods with locked hinges,
 !> against the closed form cos x cosh x = -1, and the fastest frequency that it brings. Nothing is timed.
 !>
-!>     OPENBLAS_NUM_THREADS=1 fpm run --example bench_bending_shapes --flag "$(tools/flags release)"   (with FPM_FC=mpifort)
+!>     tools/bench bending_shapes
 program bench_bending_shapes
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type

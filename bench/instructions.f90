@@ -1,6 +1,6 @@
 !> Work for the instruction counter: the same calls a given number of times, and nothing that depends on the clock.
 !>
-!>     bench_instructions KIND TIMES
+!>     tools/bench instructions KIND TIMES
 !>
 !> KIND is rhs, rhs_rigid, rhs_lumped, lanes (eight right-hand sides), or run_dop853, run_gauss, run_adams, run_bdf (0.02 s
 !> of the article's table 1), which print the number of their right-hand sides. The instructions of one are the difference

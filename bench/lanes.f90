@@ -1,7 +1,7 @@
 !> Eight scenes in vector lanes against one at a time: time of a right-hand side, and of whole cases of a sweep.
 !> All figures of one run are measured in turns and ratios formed round by round, so that they hold on a noisy machine.
 !>
-!>     OPENBLAS_NUM_THREADS=1 fpm run --example bench_lanes --flag "$(tools/flags release)"   (with FPM_FC=mpifort)
+!>     tools/bench lanes
 module rodyn_lanes_bench
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type

@@ -2,7 +2,7 @@
 !> or factored anew with another step), solution, the same with a dense Jacobian, and whole steps of CVODE. The parts of
 !> one chain are measured in turns.
 !>
-!>     OPENBLAS_NUM_THREADS=1 fpm run --example bench_newton --flag "$(tools/flags release)"   (with FPM_FC=mpifort)
+!>     tools/bench newton
 program bench_newton
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type

@@ -2,7 +2,7 @@
 !> saves. All figures of one run are measured in turns and ratios formed round by round, so that they hold on a
 !> noisy machine.
 !>
-!>     OPENBLAS_NUM_THREADS=1 fpm run --example bench_rhs --flag "$(tools/flags release)"   (with FPM_FC=mpifort)
+!>     tools/bench rhs
 program bench_rhs
    use, intrinsic :: iso_fortran_env, only: compiler_options
    use rodyn_kinds, only: wp, i8

@@ -1,7 +1,7 @@
 !> What leaving something out buys, and what it costs: time of runs with and without it, measured in turns, and the change of
 !> the motion. The scene is the article's table 1, one second, all terms kept.
 !>
-!>     OPENBLAS_NUM_THREADS=1 fpm run --example bench_skips --flag "$(tools/flags release)"   (with FPM_FC=mpifort)
+!>     tools/bench skips
 module rodyn_bench_wasteful
    use rodyn_kinds, only: wp
    use rodyn_motion, only: motion_type

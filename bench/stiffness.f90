@@ -3,9 +3,9 @@
 !> and of the rates of the slopes (as fast as the scene gets) at the end, against a run at 1e-11. A run that takes longer than
 !> `patience` is given up and its time extrapolated. The file must not exist.
 !>
-!>     OPENBLAS_NUM_THREADS=1 fpm run --example bench_stiffness --flag "$(tools/flags release)" -- stiffness.h5 4 16 64
+!>     tools/bench stiffness stiffness.h5 4 16 64
 !>
-!> (with FPM_FC=mpifort). postproc/stiffness.py draws the file.
+!> postproc/stiffness.py draws the file.
 program bench_stiffness
    use, intrinsic :: iso_fortran_env, only: compiler_options
    use rodyn_kinds, only: wp, i8

@@ -525,7 +525,7 @@ def read_stiffness(path: str | pathlib.Path) -> tuple[list[str], dict[str, np.nd
     """A file of bench/stiffness.f90: names of the methods, and columns with one entry per run (method counts from 1)."""
     with opened(path) as file:
         if "methods" not in file.attrs:
-            raise DataError(f"{path}: is no file of bench_stiffness: no attribute 'methods'")
+            raise DataError(f"{path}: is no file of tools/bench stiffness: no attribute 'methods'")
         columns = {name: data[()] for name, data in file.items() if isinstance(data, h5py.Dataset)}
         methods = text_of(file.attrs["methods"]).split(",")
     for needed in ("n", "bending_factor", "damper_factor", "method", "rtol", "seconds", "error_phi", "effort", "auto"):

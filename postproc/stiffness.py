@@ -85,7 +85,7 @@ def draw_panel(axes: Axes, runs: dict[str, np.ndarray], rtol: float) -> None:
 
 
 def main() -> int:
-    parser = command.parser(__doc__, "file of bench_stiffness")
+    parser = command.parser(__doc__, "file of tools/bench stiffness")
     arguments = parser.parse_args()
     return command.finish(lambda: plot(arguments.file, command.default_out(arguments, "stiffness")))
 

@@ -16,9 +16,9 @@ ROOT = pathlib.Path(__file__).resolve().parents[1]
 
 def main() -> None:
     """Look at every build directory."""
-    objects_of: dict[str, list[str]] = {}  # several where a benchmark has its own version of a module
+    objects_of: dict[str, list[str]] = {}
     used_by: dict[str, set[str]] = {}
-    for folder in ("src", "app", "test", "bench"):
+    for folder in ("src", "app", "test"):
         for path in sorted((ROOT / folder).rglob("*.[fF]90")):
             text = path.read_text()
             name = str(path.relative_to(ROOT)).replace("/", "_") + ".o"

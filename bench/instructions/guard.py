@@ -18,7 +18,6 @@ import re
 import shutil
 import subprocess
 import sys
-import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 COUNTS = pathlib.Path(__file__).with_name("counts.json")
@@ -45,16 +44,9 @@ def command_output(*command: str, **environment: str) -> str:
     return done.stdout
 
 
-def build(prefix: str) -> str:
+def build() -> str:
     """Build the benchmark for x86-64-v3; return its path."""
-    compiler = os.environ.get("FPM_FC", "mpifort")
-    command_output("tools/stamp_commit")
-    path = f"{ROOT / '.venv' / 'bin'}:{os.environ['PATH']}"
-    flags = command_output("tools/flags", "release", RODYN_MARCH="x86-64-v3").strip()
-    command_output("fpm", "build", "--flag", flags, FPM_FC=compiler, PATH=path)
-    runner = f"cp -t {prefix}"
-    command_output("fpm", "run", "--example", "bench_instructions", "--flag", flags, "--runner", runner, FPM_FC=compiler, PATH=path)
-    return str(pathlib.Path(prefix) / "bench_instructions")
+    return command_output("tools/bench", "--path", "instructions", RODYN_STAGE="guard", RODYN_MARCH="x86-64-v3").split()[-1]
 
 
 def instructions(program: str, kind: str, times: int) -> tuple[int, int]:
@@ -83,9 +75,8 @@ def main() -> int:
     compiler = command_output("gfortran", "-dumpfullversion").strip()
     recorded = json.loads(COUNTS.read_text()) if COUNTS.exists() else {}
     known = recorded.get(f"gfortran {compiler}", {})
-    with tempfile.TemporaryDirectory() as prefix:
-        program = build(prefix)
-        counts = {kind: round(count(program, kind)) for kind in KINDS}
+    program = build()
+    counts = {kind: round(count(program, kind)) for kind in KINDS}
     slower = []
     for kind, found in counts.items():
         change = f"{100 * (found / known[kind] - 1):+.1f} %" if kind in known else "not recorded"

@@ -1,7 +1,8 @@
 !> Measurements for bench/stability/run.py, one table each, columns apart by tabs:
 !>
-!>     bench_stability limits | orders | tableaux | tolerances | configurations | samples | extremes | drift SCENE PERIODS METHOD...
-!>     bench_stability reference SCENE.nml STEPS TIME...   (for bench/work_precision/run.py)
+!>     tools/bench stability limits | orders | tableaux | tolerances | configurations | samples | extremes
+!>     tools/bench stability drift SCENE PERIODS METHOD...
+!>     tools/bench stability reference SCENE.nml STEPS TIME...   (for bench/work_precision/run.py)
 program bench_stability
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
@@ -35,7 +36,7 @@ program bench_stability
    case ('drift'); call drift()
    case ('reference'); call print_reference()
    case default
-      error stop 'bench_stability PART ...: see the head of its source'
+      error stop 'tools/bench stability PART ...: see the head of its source'
    end select
 
 contains

@@ -12,7 +12,7 @@ results/stability/PART.txt; the document has a mark for each table, and the text
 from __future__ import annotations
 
 import argparse
-import os
+import functools
 import pathlib
 import subprocess
 import sys
@@ -36,13 +36,11 @@ RIGID = [("1e5", "gauss:fixed"), ("1e5", "gauss:1e-10"), ("1e5", "dop853:1e-10")
 PARTS = ["limits", "orders", "tolerances", "samples", "configurations", "extremes", "drift", "article"]
 
 
-def example() -> str:
+@functools.cache
+def benchmark() -> str:
     """Path of the compiled measurements."""
-    flags = subprocess.run([ROOT / "tools/flags", "release"], capture_output=True, text=True, check=True).stdout.strip()
-    environment = os.environ | {"FPM_FC": os.environ.get("FPM_FC", "mpifort")}
-    done = subprocess.run(["fpm", "run", "--example", "bench_stability", "--runner", "echo", "--flag", flags], cwd=ROOT,
-                          env=environment, capture_output=True, text=True, check=True)
-    return str(ROOT / done.stdout.split()[-1])
+    done = subprocess.run([ROOT / "tools/bench", "--path", "stability"], stdout=subprocess.PIPE, text=True, check=True)
+    return done.stdout.strip()
 
 
 def measure(part: str) -> None:
@@ -51,14 +49,14 @@ def measure(part: str) -> None:
     if part == "article":
         text = article_runs()
     elif part == "drift":
-        program = example()
+        program = benchmark()
         jobs = [(scene, *job) for scene, some in (("rod", ROD), ("rigid", RIGID), ("flexible", FLEXIBLE)) for job in some]
         text = "".join(f"# {scene}\n" + output_of([program, "drift", scene, *job]) for scene, *job in jobs)
     else:
-        text = output_of([example(), part])
+        text = output_of([benchmark(), part])
     if part == "orders":
         program = wide_program("quadruple", QUAD_ORDERS, QUAD_ORDERS.parent)
-        (RESULTS / "orders_quad.txt").write_text(output_of([program], output_of([example(), "tableaux"])))
+        (RESULTS / "orders_quad.txt").write_text(output_of([program], output_of([benchmark(), "tableaux"])))
     (RESULTS / f"{part}.txt").write_text(text)
 
 

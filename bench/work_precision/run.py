@@ -161,7 +161,7 @@ class Benchmark:
         self.budget = arguments.budget or min(6.0, max(0.5, share / 40))  # lines that are hopeless must leave time for the others
         self.tolerances = QUICK_TOLERANCES if self.quick else TOLERANCES
         python = ROOT / "bench" / "peers" / ".venv" / "bin" / "python"
-        self.workers = {"rodyn": Worker("rodyn", [build("bench_work_precision")])}
+        self.workers = {"rodyn": Worker("rodyn", [build("work_precision")])}
         self.peers: dict[str, str] = {}  # version, or why it is absent
         self.results: dict[str, list[Computation]] = {}
         self.attributes: dict[str, dict[str, Any]] = {}
@@ -562,20 +562,17 @@ def scene_path(scene: str) -> str:
     return str(HERE / f"{scene}.nml")
 
 
-def build(example: str) -> str:
+def build(benchmark: str) -> str:
     """Path of a compiled benchmark."""
-    environment = os.environ | {"FPM_FC": os.environ.get("FPM_FC", "mpifort"), "PATH": f"{ROOT / '.venv' / 'bin'}:{os.environ['PATH']}"}
-    flags = subprocess.run([ROOT / "tools" / "flags", "release"], capture_output=True, text=True, check=True).stdout.strip()
-    done = subprocess.run(["fpm", "run", "--example", example, "--runner", "echo", "--flag", flags], cwd=ROOT, env=environment,
-                          capture_output=True, text=True, check=False)
+    done = subprocess.run([ROOT / "tools/bench", "--path", benchmark], capture_output=True, text=True, check=False)
     if done.returncode:
-        raise SystemExit(f"{example} could not be built:\n{done.stderr[-2000:]}")
-    return str(ROOT / done.stdout.split()[-1])
+        raise SystemExit(f"{benchmark} could not be built:\n{done.stderr[-2000:]}")
+    return done.stdout.strip()
 
 
 def quad_reference(base: dict[str, Any], steps: int) -> dict[str, np.ndarray]:
     """phi and alpha' (probe, rod) by inertial coordinates, Jacobians at Gauss points and an extrapolated midpoint rule."""
-    command = [build("bench_stability"), "reference", base["scene"], str(steps), *map(repr, base["probe_times"])]
+    command = [build("stability"), "reference", base["scene"], str(steps), *map(repr, base["probe_times"])]
     text = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     values = np.array([[float(word) for word in line.split()] for line in text.splitlines()])
     n = read_namelist(pathlib.Path(base["scene"]).read_text())["chain"][0]["n_rods"]

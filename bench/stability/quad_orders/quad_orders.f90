@@ -1,6 +1,6 @@
 !> Orders of the methods of order 6 and more where rounding does not end the measurement: the sources of `gauss` and `dop853`
 !> compiled with wp = real128, and the tables of `erk`, on problems whose solutions are known.
-!> `bench/stability/run.py orders` builds and runs it, with the tables that `bench_stability tableaux` prints on its input.
+!> `bench/stability/run.py orders` builds and runs it, with the tables that `tools/bench stability tableaux` prints on its input.
 !>
 !> Printed, columns apart by tabs: method, order, problem, first step, and the errors of (q, p) at the end of runs, each with
 !> twice the steps of the one before.

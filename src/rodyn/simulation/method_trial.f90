@@ -1,7 +1,7 @@
 !> What methods cost on a scene, found by trying: the beginning of a run by each, with equal and growing effort.
 !>
 !> Effort is counted, not timed, so that the same scene gets the same method everywhere. The unit is one right-hand side;
-!> what else a step costs was measured (docs/performance.md, `bench_newton`).
+!> what else a step costs was measured (docs/performance.md, `tools/bench newton`).
 module rodyn_method_trial
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type
