@@ -19,7 +19,7 @@ module test_testing
    type :: unittest
       character(len=160) :: name = '' !! what holds, in words; an allocatable one would leak from array constructors (gfortran 12)
       procedure(test_interface), pointer, nopass :: test => null()
-      logical :: long = .false.      !! takes many seconds in the debug build: only with --all
+      logical :: long = .false.      !! takes many seconds: only with --all
    end type unittest
 
    type :: suite_tally

@@ -53,6 +53,7 @@ def place(tmp_path):
 # Damaged namelists
 
 
+@pytest.mark.long
 def test_damaged_namelists_neither_crash_nor_hang_nor_slip_through(tmp_path):
     told = []
     outcomes = fuzz.campaign(5, list(range(300)), 2, tmp_path, reduce=False, tell=told.append)
