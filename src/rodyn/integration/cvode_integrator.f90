@@ -112,8 +112,8 @@ contains
       if (.not. (associated(self%state) .and. c_associated(self%memory))) call raise(error, 'CVodeCreate: out of memory')
    end subroutine new_cvode_integrator
 
-   !> What CVODE is given. Errors of `adams` and `bdf` in a vibration have the same sign from period to period; those of order 1 and 2
-   !> are of use only where vibrations are calm.
+   !> What CVODE is given. Errors of `adams` and `bdf` in a vibration have the same sign from period to period; `bdf` of orders 1
+   !> and 2 is of use only where vibrations are calm.
    pure type(solver_options) function inner_options(method, options)
       character(len=*), intent(in) :: method
       type(solver_options), intent(in) :: options
