@@ -12,7 +12,7 @@ module test_held_modes
    use rodyn_motion, only: motion_type, new_motion, initial_state
    use rodyn_scene, only: scene_type, new_scene
    use test_motions, only: eigenvector_error
-   use test_random_scenes, only: allocate_case, kind_name, n_kinds, random_case, seed_random, uniform
+   use test_random_scenes, only: allocate_case, kind_name, n_kinds, random_case, seed_random
    use test_testing, only: check, check_close, new_test, unittest
    implicit none (type, external)
    private

@@ -2,7 +2,7 @@
 module test_integrators
    use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
    use rodyn_kinds, only: wp, i8
-   use rodyn_errors, only: error_type, raise, exit_stopped
+   use rodyn_errors, only: error_type, exit_stopped
    use rodyn_text, only: time_text
    use rodyn_ode, only: ode_system
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, monitor_type

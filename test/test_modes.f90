@@ -2,7 +2,7 @@
 module test_modes
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
-   use rodyn_case_config, only: case_config, kink_config, load_config
+   use rodyn_case_config, only: case_config, kink_config
    use rodyn_case_reader, only: read_case
    use rodyn_equilibrium, only: find_equilibrium
    use rodyn_lapack, only: dgeev

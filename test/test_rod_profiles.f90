@@ -2,7 +2,7 @@
 module test_rod_profiles
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
-   use rodyn_case_config, only: case_config, profile_config
+   use rodyn_case_config, only: case_config
    use rodyn_case_reader, only: parse_case, resolved_case
    use rodyn_linear_model, only: linear_model
    use rodyn_modes_at_start, only: modes_at_start

@@ -1,12 +1,12 @@
 !> One integration of the campaign: a case in, how it ended and what is left of its invariants out.
 module rodyn_bench_campaign_runs
    use rodyn_kinds, only: wp, i8
-   use rodyn_errors, only: error_type, exit_bad_input, exit_stopped
+   use rodyn_errors, only: error_type, exit_stopped
    use rodyn_case_config, only: case_config
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_motion, only: motion_type, new_motion, initial_state, state_invariants
    use rodyn_kinematics, only: invariants_type
-   use rodyn_integrator, only: solver_options, monitor_type
+   use rodyn_integrator, only: monitor_type
    use rodyn_driver, only: driver_type, new_driver, options_of
    use rodyn_simulation, only: observer_type, listed_times, simulate
    implicit none (type, external)

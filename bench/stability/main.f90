@@ -14,7 +14,7 @@ program bench_stability
    use rodyn_erk_integrator, only: erk_tableau
    use rodyn_stability_function, only: stability_function, stability_function_of
    use rodyn_step_limit, only: largest_stable_step
-   use rodyn_bench_campaign_runs, only: run_result, run_campaign_case, article_chain, empty_case
+   use rodyn_bench_campaign_runs, only: run_result, run_campaign_case, article_chain
    use rodyn_bench_quad_reference, only: qp, quad_accelerations, quad_motion, condition_number, supported
    implicit none (type, external)
 

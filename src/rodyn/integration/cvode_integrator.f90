@@ -9,7 +9,7 @@
 !> add up, to hundreds and thousands of tolerances where one-step methods leave tens. So CVODE is given smaller ones (`stricter`).
 module rodyn_cvode_integrator
    use, intrinsic :: iso_c_binding, only: c_ptr, c_int, c_long, c_double, c_null_ptr, c_associated, c_loc, c_funloc
-   use rodyn_kinds, only: wp, i8
+   use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type, raise
    use rodyn_text, only: time_text
    use rodyn_ode, only: ode_system, n_quadratures
@@ -112,8 +112,7 @@ contains
       if (.not. (associated(self%state) .and. c_associated(self%memory))) call raise(error, 'CVodeCreate: out of memory')
    end subroutine new_cvode_integrator
 
-   !> What CVODE is given. Errors of `adams` and `bdf` in a vibration have the same sign from period to period; `bdf` of orders 1
-   !> and 2 is of use only where vibrations are calm.
+   !> What CVODE is given. `bdf` of orders 1 and 2 is of use only where vibrations are calm, and needs less.
    pure type(solver_options) function inner_options(method, options)
       character(len=*), intent(in) :: method
       type(solver_options), intent(in) :: options

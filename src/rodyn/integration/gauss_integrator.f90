@@ -80,7 +80,7 @@ module rodyn_gauss_integrator
       type(step_matrices), allocatable :: now, spare      !! for the step in hand; for steps to outputs
       type(step_record) :: last, trial       !! the last accepted step, the one being tried
       real(wp), allocatable :: modal(:, :), reply(:, :), stiff(:, :) !! workspace (s, modes)
-      real(wp), allocatable :: rest(:), motion(:) !! v.q and v.p at the start of a step (modes)
+      real(wp), allocatable :: rest(:), motion(:) !! v.q and v.p at the start of a step; workspace (modes)
       real(wp), allocatable :: guess(:, :)   !! workspace (s, n_dof)
       real(wp), allocatable :: node_state(:) !! workspace: (q, p) at one node
       real(wp) :: quadrature_error(n_quadratures) = 0.0_wp !! in the last step

@@ -19,7 +19,6 @@
 module rodyn_lane_dop853
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp, i8
-   use rodyn_errors, only: error_type, raise
    use rodyn_lanes, only: lanes
    use rodyn_aligned_store, only: aligned_store
    use rodyn_lane_ode, only: lane_system

@@ -1,6 +1,6 @@
 !> What CVODE and ARKODE share: the callbacks, the text of return codes, the version.
 module rodyn_sundials_base
-   use, intrinsic :: iso_c_binding, only: c_ptr, c_int, c_long, c_double, c_char, c_size_t, c_null_char, &
+   use, intrinsic :: iso_c_binding, only: c_ptr, c_int, c_double, c_char, c_size_t, &
       c_f_pointer, c_loc, c_associated
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type, raise
