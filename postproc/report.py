@@ -22,7 +22,16 @@ import numpy as np
 from figures import Picture, pictures
 from natural_frequencies import natural_frequencies
 from rodyn_data import (
-    LEDGER_SYMBOLS, SPACECRAFT_SYMBOLS, VERSION_ATTRIBUTES, DataError, Run, Sweep, distinct, is_sweep, open_run, open_sweep,
+    LEDGER_SYMBOLS,
+    SPACECRAFT_SYMBOLS,
+    VERSION_ATTRIBUTES,
+    DataError,
+    Run,
+    Sweep,
+    distinct,
+    is_sweep,
+    open_run,
+    open_sweep,
 )
 from spectrum import MANY_RODS
 

@@ -18,8 +18,8 @@ from typing import NamedTuple
 import command
 import numpy as np
 from article import TABLE_1, TABLE_2, TABLE_3, TABLE_3_AXIS, TABLE_3_QUANTITIES, TABLE_3_TIME, Printed
-from exact_lumped import INERTIA, Pair, pair_up
-from rodyn_data import DataError, Run, Sweep, is_sweep, open_run, open_sweep, symbol_text, split_name
+from exact_lumped import Pair, pair_up
+from rodyn_data import DataError, Run, Sweep, is_sweep, open_run, open_sweep, split_name, symbol_text
 
 MISSING = "–"
 

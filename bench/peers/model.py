@@ -10,6 +10,7 @@ only `consistent` scenes, without kinks, with constant loads on the spacecraft o
 
 from __future__ import annotations
 
+import itertools
 import pathlib
 import sys
 from dataclasses import dataclass, field
@@ -17,7 +18,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "postproc"))
-from namelist import read_namelist  # noqa: E402
+from namelist import read_namelist
 
 # Columns of the constants of a rod.
 (LENGTH, M0, M1, A1, B1, SA, SB, AA, AB, BB, G1, G2, H1, H2, I11, I12, I22, M0R, M1R, M2R, KAPPA, MU, COUNT) = range(23)
@@ -144,7 +145,7 @@ def segments_of(loads: list[dict], t_end: float, n: int) -> list[Segment]:
     for load in loads:
         times |= {float(t) for t in (load.get("t_start", 0.0), load.get("t_end", t_end)) if 0 < t < t_end}
     edges = sorted(times)
-    segments = [Segment(a, b) for a, b in zip(edges, edges[1:], strict=False)]
+    segments = [Segment(a, b) for a, b in itertools.pairwise(edges)]
     for load in loads:
         for segment in segments:
             if not load.get("t_start", 0.0) <= segment.start < load.get("t_end", t_end):

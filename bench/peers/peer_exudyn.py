@@ -15,7 +15,7 @@ import numpy as np
 
 sys.exudynFast = True  # the build without checks of ranges
 import exudyn as exu  # noqa: E402
-import exudyn.itemInterface as ei  # noqa: E402
+import exudyn.itemInterface as ei  # noqa: E402, N813
 from model import LENGTH, M0, MU, Scene, read_scene  # noqa: E402
 
 TREE = {"Exudyn tree DOPRI5": "DOPRI5", "Exudyn tree RK67": "RK67"}
@@ -89,7 +89,7 @@ def joints(scene: Scene) -> tuple[Any, Any]:
         new_angle = mbs.AddMarker(ei.MarkerNodeCoordinate(nodeNumber=node, coordinate=2))
         mbs.AddObject(ei.ObjectConnectorCoordinateSpringDamper(markerNumbers=[angle, new_angle], stiffness=scene.stiffness[k],
                                                                damping=scene.damping[k]))
-        body, angle, outer, at = new, new_angle, [length - centre, 0, 0], at + [length, 0]
+        body, angle, outer, at = new, new_angle, [length - centre, 0, 0], at + np.array([length, 0])
         nodes.append(node)
     mbs.Assemble()
 

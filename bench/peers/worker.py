@@ -25,7 +25,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 Answer = dict[str, Any]
 
 
-class TooLong(Exception):
+class TookTooLongError(Exception):
     """The budget of a computation is used up."""
 
 
@@ -40,9 +40,9 @@ def main(name: str) -> None:
             peer = peer or __import__(f"peer_{name}")
             answer = {"lines": peer.lines(job["scene"]), "version": peer.version()} if job["method"] == "names" else time_job(peer, job)
             answer = {"status": "done"} | answer
-        except TooLong:
+        except TookTooLongError:
             answer = {"status": "failed", "message": "stopped: took too long"}
-        except Exception as error:  # noqa: BLE001: whatever a peer raises is its answer
+        except Exception as error:  # whatever a peer raises is its answer
             answer = {"status": "failed", "message": f"{type(error).__name__}: {error}"[:500]}
         finally:
             signal.setitimer(signal.ITIMER_REAL, 0)
@@ -50,7 +50,7 @@ def main(name: str) -> None:
 
 
 def stop(*_: object) -> None:
-    raise TooLong
+    raise TookTooLongError
 
 
 def time_job(peer: types.ModuleType, job: Answer) -> Answer:
@@ -60,7 +60,7 @@ def time_job(peer: types.ModuleType, job: Answer) -> Answer:
     start = time.perf_counter()
     first, result = run()
     seconds = [first] if time.perf_counter() - start > 1.0 else []  # compilation is done before that
-    with contextlib.suppress(TooLong):
+    with contextlib.suppress(TookTooLongError):
         while len(seconds) < job.get("repeats", 1):
             seconds.append(run()[0])
     return result | {"seconds": min(seconds or [first])}

@@ -42,8 +42,8 @@ import h5py
 import numpy as np
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
-import multipliers  # noqa: E402
-from ordinary_scenes import FAMILIES, Group, Typist, groups_of, text_of  # noqa: E402
+import multipliers
+from ordinary_scenes import FAMILIES, Group, Typist, groups_of, text_of
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 RODYN = os.environ.get("RODYN", str(ROOT / "bin" / "rodyn"))
@@ -309,9 +309,11 @@ def sweep_faults(family: str, seed: int) -> list[str]:
     together = sweep("together", list(range(len(times))))
     for i in range(len(times)):
         alone = sweep(f"alone_{i}", [i] * 4)  # lanes need four like cases
-        for key in alone.keys() - {"code"}:
-            if np.asarray(alone[key][0]).tobytes() != np.asarray(together[key][i]).tobytes():
-                faults.append(f"sweep {family} {seed}, case {i + 1}: {key} differs: {alone[key][0]} alone, {together[key][i]} together")
+        faults += [
+            f"sweep {family} {seed}, case {i + 1}: {key} differs: {alone[key][0]} alone, {together[key][i]} together"
+            for key in alone.keys() - {"code"}
+            if np.asarray(alone[key][0]).tobytes() != np.asarray(together[key][i]).tobytes()
+        ]
     return faults
 
 

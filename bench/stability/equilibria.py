@@ -16,7 +16,6 @@ import tempfile
 
 import h5py
 import numpy as np
-
 from program import RODYN
 
 

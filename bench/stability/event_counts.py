@@ -62,7 +62,7 @@ def events(folder: pathlib.Path, program: str, case: str, method: str, rtol: flo
         return done.stderr.strip()
     with xarray.open_dataset(result, group="events") as data:
         kinds = [kind.decode() if isinstance(kind, bytes) else str(kind) for kind in data.kind.values]
-        return sorted(zip(data.hinge.values.tolist(), kinds), key=lambda event: event[0])
+        return sorted(zip(data.hinge.values.tolist(), kinds, strict=True), key=lambda event: event[0])
 
 
 def main() -> int:

@@ -25,9 +25,9 @@ import h5py
 import numpy as np
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
-import program  # noqa: E402
-from run_files import OF_THE_HOUR, differences  # noqa: E402
-from scenes import CHAIN, MOMENT, SPACECRAFT  # noqa: E402
+import program
+from run_files import OF_THE_HOUR, differences
+from scenes import CHAIN, MOMENT, SPACECRAFT
 
 #: About a third of a second, a megabyte in several blocks.
 CASE = ("&case title = 'Disturbed', t_end = 3, n_outputs = 6000 /\n" + SPACECRAFT + CHAIN + MOMENT

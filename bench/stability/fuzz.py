@@ -35,8 +35,8 @@ import h5py
 import numpy as np
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
-import program  # noqa: E402
-from mutants import mutant, pieces  # noqa: E402
+import program
+from mutants import mutant, pieces
 
 STOP_AFTER = 0.5  # [s]
 MOST_REDUCTIONS = 400

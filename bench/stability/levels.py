@@ -15,8 +15,8 @@ import sys
 import tempfile
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
-from run_files import largest_difference  # noqa: E402
-from scenes import scenes  # noqa: E402
+from run_files import largest_difference
+from scenes import scenes
 
 LARGEST = 1e-9
 

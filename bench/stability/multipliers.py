@@ -7,6 +7,7 @@ program: coordinates, element integrals, laws of hinges, impacts and integration
 from __future__ import annotations
 
 import hashlib
+import itertools
 import os
 import pathlib
 import subprocess
@@ -122,7 +123,7 @@ def pieces(rod: int, profiles: list[dict]) -> list[str]:
             found[keys["quantity"]] = keys
     breaks = sorted({0.0, 1.0, *(x for keys in found.values() for x in keys.get("positions", []))})
     lines = [str(len(breaks) - 1), " ".join(map(repr, breaks))]
-    for low, high in zip(breaks, breaks[1:], strict=False):
+    for low, high in itertools.pairwise(breaks):
         numbers = []
         for quantity in ("mass_per_length", "bending_stiffness"):
             keys = found.get(quantity, {"polynomial": [1.0]})

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 RODYN = os.environ.get("RODYN", str(ROOT / "bin" / "rodyn"))
-MEMORY = int(os.environ.get("RODYN_MEMORY", 4 << 30))  # address space [bytes]; -1: no limit, which the sanitizers need
+MEMORY = int(os.environ.get("RODYN_MEMORY") or 4 << 30)  # address space [bytes]; -1: no limit, which the sanitizers need
 FILES = 1 << 30         # of a file [bytes]
 LONGEST = 2.0           # processor time of a command [s]
 HANGS = 60.0            # wall time, on a machine that others use, too [s]

@@ -40,7 +40,7 @@ def in_order(found: dict[str, tuple[pathlib.Path, set[str]]]) -> tuple[list[str]
             return True
         if name not in found or name in foreign:
             return False
-        if not all([visit(used) for used in sorted(found[name][1])]):
+        if not all([visit(used) for used in sorted(found[name][1])]):  # noqa: C419 (all are to be visited)
             foreign.append(name)
             return False
         order.append(name)

@@ -27,9 +27,10 @@ def commands(directory: pathlib.Path):
         yield name, ["run", f"{number}.nml"], 0
     (directory / "base.nml").write_text(BASE)
     for number, text in enumerate(SWEEPS):
+        adapted = text
         for quick, slow in (("case_seconds = 0.5", "case_seconds = 500"), (", 1e5, 1e6, 1e7, 1e8, 1e9, 1e10", "")):
-            text = text.replace(quick, slow)
-        (directory / f"sweep{number}.nml").write_text(text)
+            adapted = adapted.replace(quick, slow)
+        (directory / f"sweep{number}.nml").write_text(adapted)
         yield f"sweep {number}", ["sweep", f"sweep{number}.nml"], 0
         yield f"sweep {number} again", ["sweep", f"sweep{number}.nml"], 0
     yield "dry run", ["sweep", "sweep0.nml", "--dry-run"], 0

@@ -17,6 +17,7 @@ import argparse
 import contextlib
 import datetime
 import hashlib
+import itertools
 import json
 import math
 import os
@@ -539,12 +540,12 @@ def time_at(errors: list[float], seconds: list[float], target: float) -> float:
     """Least time at which the error is `target`, between neighbouring computations in log-log; NaN outside."""
     known = [(math.log(e), math.log(s)) for e, s in zip(errors, seconds, strict=True) if e > 0 and s > 0 and math.isfinite(e * s)]
     wanted, best = math.log(target), math.inf
-    for (e0, s0), (e1, s1) in zip(known, known[1:], strict=False):
+    for (e0, s0), (e1, s1) in itertools.pairwise(known):
         if min(e0, e1) <= wanted <= max(e0, e1):
             weight = (wanted - e0) / (e1 - e0) if e1 != e0 else 0.0
             best = min(best, s0 + weight * (s1 - s0))
     if known and wanted > max(e for e, _ in known):  # more exact than asked for, at the loosest setting
-        best = min(best, min(s for _, s in known))
+        best = min(best, *(s for _, s in known))
     return math.exp(best) if math.isfinite(best) else math.nan
 
 

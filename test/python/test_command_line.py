@@ -130,7 +130,7 @@ def test_help_is_printed_by_the_program_and_by_every_command(tmp_path):
     assert files(tmp_path) == []
 
 
-@pytest.mark.parametrize("arguments, message", [
+@pytest.mark.parametrize(("arguments", "message"), [
     ([], "rodyn run CASE.nml"),
     (["integrate"], "there is no command 'integrate'"),
     (["Run"], "there is no command 'Run'"),
@@ -224,7 +224,7 @@ def test_all_faults_of_a_case_come_at_once(tmp_path, command):
     assert numbers == sorted(numbers)
 
 
-@pytest.mark.parametrize("text, fault", [
+@pytest.mark.parametrize(("text", "fault"), [
     (TIMES + SPACECRAFT + CHAIN.replace("mass_per_length = 1.7", "mass_per_length = 1.7, 0, 1.7"),
      "&chain mass_per_length = 1.7, 0, 1.7: must be positive when bending = 'dynamic', but is 0 for rod 2"),
     (TIMES + SPACECRAFT + CHAIN.replace("mass_per_length = 1.7", "mass_per_length = 1.7, 0, 0").replace("0.5", "2*1, 0")
@@ -654,7 +654,7 @@ def printed(text: str) -> dict[str, str]:
     return {line[:8].strip(): line[8:] for line in text.splitlines()}
 
 
-@pytest.mark.parametrize("scene, uses, skips", [
+@pytest.mark.parametrize(("scene", "uses", "skips"), [
     ("flexible", "free spacecraft, bending as motion, rod inertia, second-order inertia, dampers, 2 loads, loads on nodes, ledger",
      "kinks"),
     ("one rod", "free spacecraft, bending as motion, rod inertia, second-order inertia, 1 load, ledger",
@@ -678,7 +678,7 @@ def test_a_run_says_what_it_uses_and_what_it_skips(results, scene, uses, skips):
     assert ("ledger" in lines) == (scene != "no ledger")
 
 
-@pytest.mark.parametrize("scene, sizes, method", [
+@pytest.mark.parametrize(("scene", "sizes", "method"), [
     ("flexible", "3 rods (3 distinct kinds), 24 states; recursive kernel, O(n)", r"gauss: auto: frequencies .* rad/s, dampers"),
     ("one rod", "1 rod (1 distinct kind), 12 states; recursive kernel, O(n)", r"gauss: auto: frequencies .* about \d+ steps"),
     ("one rigid rod, fixed", "1 rod (1 distinct kind), 2 states; recursive kernel, O(n)", r"gauss: auto: "),
@@ -764,7 +764,7 @@ def rows_until_failure(path: pathlib.Path, n_intervals: int, t_end: float) -> xa
     return run
 
 
-@pytest.mark.parametrize("method, steps", [("adams", 60), ("bdf", 60), ("erk", 60), ("dop853", 60), ("gauss", 15)])
+@pytest.mark.parametrize(("method", "steps"), [("adams", 60), ("bdf", 60), ("erk", 60), ("dop853", 60), ("gauss", 15)])
 def test_too_many_steps_end_a_run(tmp_path, method, steps):
     text = "&case t_end = 0.05, n_outputs = 50 /\n" + SPACECRAFT + CHAIN + MOMENT
     whole = run_scene(tmp_path, text + f"&solver method = '{method}' /\n", "whole")

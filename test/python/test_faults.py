@@ -509,7 +509,7 @@ def no_locks(tmp_path_factory) -> dict[str, str]:
     return os.environ | {"LD_PRELOAD": str(place / "no_locks.so")}
 
 
-@pytest.mark.parametrize("number, name", [(37, "No locks available"), (38, "Function not implemented"),
+@pytest.mark.parametrize(("number", "name"), [(37, "No locks available"), (38, "Function not implemented"),
                                           (95, "Operation not supported")])
 def test_file_systems_without_locks(place, no_locks, number, name):
     env = no_locks | {"LOCK_ERRNO": str(number)}

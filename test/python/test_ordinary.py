@@ -20,7 +20,7 @@ import pytest
 import result_files
 
 sys.path.insert(0, str(result_files.ROOT / "bench" / "stability"))
-from ordinary_scenes import FAMILIES, groups_of, text_of  # noqa: E402
+from ordinary_scenes import FAMILIES, groups_of, text_of
 
 STORED = json.loads((pathlib.Path(__file__).parent / "ordinary_motions.json").read_text())
 RTOL, ATOL = 1e-8, 1e-10  # the defaults

@@ -185,7 +185,7 @@ def test_the_ledger_shows_the_size_of_the_residual(runs, tmp_path):
 
 
 def test_a_run_without_ledger_is_told(runs, tmp_path):
-    with pytest.raises(DataError, match="no data set 'energy_kinetic'; the case was run with ledger = .false."):
+    with pytest.raises(DataError, match=r"no data set 'energy_kinetic'; the case was run with ledger = \.false\."):
         ledger.plot(runs["no_ledger"], tmp_path / "x.png")
 
 

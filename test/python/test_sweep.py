@@ -277,7 +277,7 @@ def test_a_failed_case_is_nan_and_alone(here):
     assert (here / "s" / "sweep-1.h5").exists()
 
 
-@pytest.mark.parametrize("method, keep_series, steps", [("dop853", ".true.", (20, 150, 300, 400)), ("bdf", ".false.", (200, 3000))])
+@pytest.mark.parametrize(("method", "keep_series", "steps"), [("dop853", ".true.", (20, 150, 300, 400)), ("bdf", ".false.", (200, 3000))])
 def test_a_failed_case_reached_the_last_row_of_its_run(here, method, keep_series, steps):
     case = BASE.replace("n_outputs = 5", "n_outputs = 50").replace("&solver rtol = 1e-6, atol = 1e-8", f"&solver method = '{method}'")
     (here / "base.nml").write_text(case)

@@ -66,7 +66,7 @@ def test_exact_and_lumped_stand_over_their_difference(sweeps, tmp_path, name):
 
 
 def test_a_sweep_without_both_kinds_of_inertia_is_told(sweeps, tmp_path):
-    with pytest.raises(DataError, match="no axis 'model.inertia'; it has chain.hinge_stiffness"):
+    with pytest.raises(DataError, match=r"no axis 'model\.inertia'; it has chain\.hinge_stiffness"):
         exact_lumped.plot(sweeps["grid"], tmp_path / "x.png", ["phi(1)"])
 
 
