@@ -240,7 +240,7 @@ contains
    subroutine skip_words(document, s, first, rule)
       type(namelist_document), intent(inout) :: document
       type(scanner), intent(inout) :: s
-      integer, intent(in) :: first !! where they begin
+      integer, value :: first !! where they begin; a copy, for it may come as `s%at`
       character(len=*), intent(in) :: rule
       type(scanner) :: next
       integer :: last
