@@ -2,6 +2,7 @@
 
     python tools/layers.py            print what breaks the order (exit 1), or else the drawing and the table
     python tools/layers.py --write    put drawing and table into docs/developers.md
+    python tools/layers.py --modules  drawing, and the modules of each layer, as the front page of the API reference (tools/api)
 """
 
 from __future__ import annotations
@@ -103,13 +104,29 @@ def section() -> str:
     return f"```\n{drawing()}\n```\n\n{table()}\n"
 
 
+def modules(root: pathlib.Path = ROOT) -> str:
+    """The drawing, and each layer's modules with the first sentence of their comments; [[...]] is a link of FORD."""
+    text = f"```\n{drawing()}\n```\n\nWhat the library offers is in [[rodyn]]; each layer uses those below it.\n"
+    for row in reversed(ORDER):
+        for folder, purpose in row.items():
+            text += f"\n### {folder}: {purpose}\n\n"
+            for path in sorted((root / "src" / "rodyn" / folder).glob("*.[fF]90")):
+                source = path.read_text()
+                comment = re.match(r"(?:!>.+\n)*", source)[0].replace("!>", "").split()
+                sentence = re.split(r"(?<=\.) ", " ".join(comment))[0]
+                text += "".join(f"- [[{name}]]: {sentence}\n" for name in MODULE.findall(source))
+    return text
+
+
 def main() -> int:
     """Judge, then print or write."""
     found = faults()
     if found:
         print("\n".join(found))
         return 1
-    if sys.argv[1:] == ["--write"]:
+    if sys.argv[1:] == ["--modules"]:
+        print(modules(), end="")
+    elif sys.argv[1:] == ["--write"]:
         before, rest = GUIDE.read_text().split(BEGIN)
         GUIDE.write_text(before + BEGIN + section() + END + rest.split(END)[1])
     else:

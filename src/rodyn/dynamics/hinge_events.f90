@@ -2,7 +2,7 @@
 !>
 !> What an integrator watches are the margins of `rodyn_hinge_mechanism`, one for each part that a hinge has. When one becomes
 !> negative the run stops there, `respond` changes the laws, and it starts anew. A hinge that becomes a constraint
-!> changes the rates in no time: momenta stay, energy is lost (`rodyn_velocity_jump`).
+!> changes the rates in no time: momenta stay, energy is lost (`velocity_jump` of `rodyn_accelerations`).
 !>
 !> Between massless rods the joints follow from their laws (`rodyn_three_moments`), and the laws hold for joints: both are sought
 !> together, at the start and after every jump (`balance`). All laws are monotone, so there is one answer, that of least
