@@ -59,7 +59,7 @@ START_UP = 240.0  # seconds a peer may take to compile
 AGREEMENT = 1e-9  # rad: what a peer must reach at its tightest to count as solving the same equations
 DOCUMENT = ROOT / "docs" / "work_precision.md"
 DOCUMENTED = ["table1", "rigid"]  # scenes whose pictures are in it
-MARK = "<!-- Below: written by bench/work_precision/run.py --docs -->"
+BEGIN, END = "<!-- written by bench/work_precision/run.py --docs -->\n", "<!-- end of what it writes -->\n"
 #: Scenes that bench/stability/quad_reference.f90 knows and can afford: its steps between two probe times.
 QUAD_STEPS = {"table1": 400, "rigid": 40}
 HEYOKA = {"quadruple": 1e-20, "extended": 1e-19}  # tolerances of references
@@ -489,7 +489,7 @@ class Benchmark:
                     data = group.create_dataset(name, data=np.array(values, float))
                     data.attrs.update({"units": unit, "long_name": meaning})
                 data = group.create_dataset("n_rhs", data=np.array([c.n_rhs for c in found], int))
-                data.attrs.update({"units": "1", "long_name": "right-hand sides; -1: unknown"})
+                data.attrs.update({"units": "1", "long_name": "evaluations of the right-hand side; -1: unknown"})
         out.with_suffix(".md").write_text(self.report(command))
 
     def report(self, command: str) -> str:
@@ -512,14 +512,12 @@ class Benchmark:
                 cells = ["" if not np.isfinite(s) or t < trusted else f"{1e3 * s:.3g}" for s, t in zip(times, TARGETS, strict=True)]
                 if any(cells):
                     text.append(f"| {line.name} | " + " | ".join(cells) + " |")
-            lost = sorted({f"{c.line.name}: {c.message}" for c in found if c.message and not c.message.startswith("left out: the one")})
-            if lost:
-                text += ["", "Left out or failed (the first of each method):", ""]
-                seen: set[str] = set()
-                for entry in lost:
-                    if entry.split(":")[0] not in seen:
-                        seen.add(entry.split(":")[0])
-                        text.append(f"- {entry}")
+            lost: dict[str, str] = {}  # the first message of each method
+            for c in sorted(found, key=lambda c: (c.line.name, c.message)):
+                if c.message and not c.message.startswith(("left out", "stopped")):
+                    lost.setdefault(c.line.name, c.message)
+            failed = [f"{name} ({message.removeprefix('failed: ')})" for name, message in lost.items()]
+            text += ["", f"Failed: {'; '.join(failed)}."] if failed else []
             text.append("")
         return "\n".join(text) + "\n"
 
@@ -631,8 +629,8 @@ def main() -> int:
             worker.stop()
     draw(arguments.out)
     if arguments.docs:
-        head = DOCUMENT.read_text().partition(MARK)[0]
-        DOCUMENT.write_text(head + MARK + "\n\n" + arguments.out.with_suffix(".md").read_text())
+        head, _, old = DOCUMENT.read_text().partition(BEGIN)
+        DOCUMENT.write_text(head + BEGIN + arguments.out.with_suffix(".md").read_text() + END + old.partition(END)[2])
         for scene in set(DOCUMENTED) & set(benchmark.results):
             shutil.copy(arguments.out.parent / f"{arguments.out.name}-{scene}.png", ROOT / "docs" / "pictures" / f"work-precision-{scene}.png")
     print(arguments.out.with_suffix(".md").read_text())
