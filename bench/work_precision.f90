@@ -82,8 +82,9 @@ program bench_work_precision
    use rodyn_case_reader, only: read_case
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_motion, only: motion_type, new_motion, initial_state
+   use rodyn_methods, only: methods
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics
-   use rodyn_integrators, only: new_integrator, integrator_names
+   use rodyn_integrators, only: new_integrator
    use rodyn_simulation, only: listed_times, simulate
    use rodyn_bench_jobs, only: budget_monitor, probe_recorder, text_length, most_probes
    implicit none (type, external)
@@ -237,9 +238,9 @@ contains
    subroutine answer_names()
       integer :: i
       write (*, '(a)', advance='no') '{"status": "done", "names": ['
-      do i = 1, size(integrator_names)
+      do i = 1, size(methods)
          if (i > 1) write (*, '(a)', advance='no') ', '
-         write (*, '(3a)', advance='no') '"', trim(integrator_names(i)), '"'
+         write (*, '(3a)', advance='no') '"', trim(methods(i)%name), '"'
       end do
       write (*, '(5a)') '], "compiler": "', compiler_version(), '", "compiler_options": "', compiler_options(), '"}'
    end subroutine answer_names

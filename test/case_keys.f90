@@ -185,7 +185,7 @@ contains
          spacecraft//'&chain n_rods = 4, length = 0, mass_per_length = -1, bending_stiffness = 0,'//&
          nl//' node_mass = -1, hinge_stiffness = -1, hinge_damping = -1 /'//nl//&
          '&case n_outputs = 0 t_end = -1 /'//nl//'&model gauss_points = 201 /'//nl//&
-         '&solver rtol = 1 atol = 0 order = 13 max_step = -1 max_steps = 0 /'//nl//&
+         '&solver rtol = 1 atol = 0 order = 17 max_step = -1 max_steps = 0 /'//nl//&
          '&output compression = 10 /', &
          'c.nml:2: &chain length = 0: must be positive [m]'//nl//&
          'c.nml:2: &chain mass_per_length = -1: must not be negative [kg/m]'//nl//&
@@ -198,7 +198,7 @@ contains
          'c.nml:5: &model gauss_points = 201: must lie in 1..200'//nl//&
          'c.nml:6: &solver rtol = 1: must be greater than 0 and less than 1'//nl//&
          'c.nml:6: &solver atol = 0: must be positive'//nl//&
-         'c.nml:6: &solver order = 13: must lie in 0..12'//nl//&
+         'c.nml:6: &solver order = 17: must lie in 0..16'//nl//&
          'c.nml:6: &solver max_step = -1: must not be negative [s]'//nl//&
          'c.nml:6: &solver max_steps = 0: must be at least 1'//nl//&
          'c.nml:7: &output compression = 10: must lie in 0..9')

@@ -1,7 +1,8 @@
 !> Rules that tie several keys of a case together.
 module test_case_rules
    use rodyn_errors, only: error_type
-   use test_case_support, only: expect_faults, nl, spacecraft, chain, valid
+   use rodyn_case_config, only: case_config
+   use test_case_support, only: expect_accepted, expect_faults, nl, spacecraft, chain, valid
    use test_testing, only: new_test, unittest
    implicit none (type, external)
    private
@@ -287,6 +288,7 @@ contains
 
    subroutine orders(error)
       type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
       call expect_faults(error, valid//'&solver order = 5 /', &
          'c.nml:3: &solver order = 5: goes with a method that is named; ''auto'' chooses the order, too')
       if (allocated(error)) return
@@ -298,6 +300,8 @@ contains
       if (allocated(error)) return
       call expect_faults(error, valid//'&solver method = ''dop853'', order = 7 /', &
          'c.nml:3: &solver order = 7: must be 0 or 8 when method = ''dop853''')
+      if (allocated(error)) return
+      call expect_accepted(error, valid//'&solver method = ''gauss'', order = 16 /', config)
    end subroutine orders
 
 end module test_case_rules

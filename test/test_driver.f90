@@ -6,7 +6,7 @@ module test_driver
    use rodyn_case_reader, only: parse_case
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_motion, only: motion_type, new_motion, initial_state
-   use rodyn_integrator, only: integrator_type, solver_options, solver_statistics
+   use rodyn_integrator, only: integrator_type, solver_statistics
    use rodyn_driver, only: driver_type, new_driver
    use rodyn_method_trial, only: effort_of
    use rodyn_simulation, only: observer_type, even_times, simulate
@@ -268,11 +268,7 @@ contains
       call new_motion(run%motion, run%scene, .true., error)
       if (allocated(error)) return
       call initial_state(run%motion, run%config%initial, run%y)
-      associate (solver => run%config%solver)
-         call new_driver(run%driver, run%motion, run%y, trim(solver%method), &
-                         solver_options(rtol=solver%rtol, atol=solver%atol, max_steps=solver%max_steps), &
-                         run%config%t_end, 10, error)
-      end associate
+      call new_driver(run%driver, run%motion, run%y, run%config%solver, run%config%t_end, 10, error)
       allocate (run%kept%states(size(run%y), 11), source=0.0_wp)
    end subroutine prepare
 

@@ -3,7 +3,8 @@ module test_integrators
    use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type, exit_stopped
-   use rodyn_text, only: time_text
+   use rodyn_methods, only: method_words, table => methods
+   use rodyn_text, only: time_text, word, word_count
    use rodyn_ode, only: ode_system
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, monitor_type
    use rodyn_integrators, only: new_integrator, sundials_version
@@ -65,6 +66,7 @@ contains
          new_test('an explosion is an error with the last good time', exploding), &
          new_test('a monitor can stop a run', monitor_stops), &
          new_test('bad options are refused by name', bad_options), &
+         new_test('each row of the table of methods has an integrator and keeps its word', table_of_methods), &
          new_test('an output beyond the stop time is refused', beyond_stop), &
          new_test('1000 lives leave no memory behind', no_heap_growth), &
          new_test('times in messages are short', short_times), &
@@ -734,6 +736,26 @@ contains
       if (allocated(error)) return
       call check(error, refused('euler', solver_options(), 'no integrator'), 'unknown method')
    end subroutine bad_options
+
+   !> Each row of the table of methods has an integrator, takes its own orders and no others, and its name is a word of the key.
+   subroutine table_of_methods(error)
+      type(error_type), allocatable, intent(out) :: error
+      integer :: i
+
+      call check(error, word_count(method_words), size(table), 'words')
+      do i = 1, size(table)
+         associate (row => table(i))
+            if (.not. allocated(error)) call check(error, word(method_words, i), trim(row%name), 'word')
+            if (.not. allocated(error)) call check(error, .not. refused(row%name, solver_options(order=row%lowest_order), 'order') &
+               .and. .not. refused(row%name, solver_options(order=row%highest_order), 'order') &
+               .and. .not. refused(row%name, solver_options(), 'no integrator'), row%name//' is refused')
+            if (.not. allocated(error)) call check(error, refused(row%name, solver_options(order=row%highest_order + 1), 'order') &
+               .and. (row%lowest_order == 1 .or. refused(row%name, solver_options(order=row%lowest_order - 1), 'order')) &
+               .and. (row%fixed_steps .neqv. refused(row%name, solver_options(fixed_step=0.1_wp), 'fixed_step')), &
+               row%name//' takes what it cannot do')
+         end associate
+      end do
+   end subroutine table_of_methods
 
    subroutine beyond_stop(error)
       type(error_type), allocatable, intent(out) :: error

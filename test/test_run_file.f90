@@ -88,9 +88,9 @@ contains
       report%method = 'bdf'
       report%reason = 'asked for'
       report%kernel = 'recursive'
-      report%order = 5
-      report%rtol = 1.0e-8_wp
-      report%atol = 1.0e-10_wp
+      report%options%order = 5
+      report%options%rtol = 1.0e-8_wp
+      report%options%atol = 1.0e-10_wp
       report%n_steps = 5000000000_i8
       report%n_rhs = 123_i8
       report%wall_seconds = 0.5_wp

@@ -17,7 +17,7 @@ BEGIN, END = "<!-- made by tools/layers.py --write -->\n", "<!-- end of what too
 
 # From bottom to top. A folder may use those of lower rows, and none beside or above it.
 ORDER = [
-    {"base": "precision, errors, texts, sorting, quadrature, the operating system, LAPACK"},
+    {"base": "precision, errors, texts, sorting, quadrature, the methods of integration by name, the operating system, LAPACK"},
     {"case": "a case as it is described: its keys, their units, rules and defaults, for files and for the library"},
     {"scene": "a case compiled: rods, hinge laws, loads, spacecraft",
      "ode": "what an integrator needs to know of a system y' = f(t, y), alone and in vector lanes"},

@@ -7,7 +7,7 @@ module rodyn_bench_campaign_runs
    use rodyn_motion, only: motion_type, new_motion, initial_state, state_invariants
    use rodyn_kinematics, only: invariants_type
    use rodyn_integrator, only: monitor_type
-   use rodyn_driver, only: driver_type, new_driver, options_of
+   use rodyn_driver, only: driver_type, new_driver
    use rodyn_simulation, only: observer_type, listed_times, simulate
    implicit none (type, external)
    private
@@ -112,8 +112,7 @@ contains
          return
       end if
       call initial_state(motion, config%initial, result%y)
-      call new_driver(driver, motion, result%y, trim(config%solver%method), options_of(config), times(size(times)), &
-                      size(times), error)
+      call new_driver(driver, motion, result%y, config%solver, times(size(times)), size(times), error)
       if (.not. allocated(error)) call driver%make(error)
       if (.not. allocated(error)) result%method = driver%choice%method
       if (allocated(error)) then

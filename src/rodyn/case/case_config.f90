@@ -6,6 +6,7 @@
 !> here serve cases that are filled by hand.
 module rodyn_case_config
    use rodyn_kinds, only: wp
+   use rodyn_methods, only: solver_options
    implicit none (type, external)
    private
    public :: case_config, spacecraft_config, chain_config, profile_config, model_config, initial_config, load_config, kink_config, &
@@ -125,16 +126,9 @@ module rodyn_case_config
       real(wp) :: friction_velocity = 0.0_wp    !! from which all of it acts [rad/s]
    end type hinge_config
 
-   !> &solver
-   type :: solver_config
-      character(len=name_length) :: method = 'auto' !! 'auto', 'adams', 'bdf', 'erk', 'dop853', 'gauss'
-      real(wp) :: rtol = 1.0e-8_wp                  !! relative tolerance
-      real(wp) :: atol = 1.0e-10_wp                 !! absolute tolerance, all states
-      integer :: order = 0                          !! highest order; 0: the method's own choice
-      real(wp) :: max_step = 0.0_wp                 !! [s]; 0: no bound
-      real(wp) :: fixed_step = 0.0_wp               !! [s], 'erk', 'dop853', 'gauss'; 0: adaptive
-      logical :: allow_unstable = .false.           !! fixed steps beyond the method's stability limit
-      integer :: max_steps = 1000000000             !! steps of the whole run
+   !> &solver: what integrators are told, and which of them it is.
+   type, extends(solver_options) :: solver_config
+      character(len=name_length) :: method = 'auto' !! or one of `rodyn_methods`
       integer :: max_events = 100000                !! events of the whole run
    end type solver_config
 

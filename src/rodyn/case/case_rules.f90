@@ -6,6 +6,7 @@ module rodyn_case_rules
    use rodyn_key_judge, only: key_judge, no_such
    use rodyn_hinge_rules, only: check_moving_hinges
    use rodyn_law_rules, only: check_law_keys, check_table
+   use rodyn_methods, only: list_of_methods, method_named, method_type, methods, order_rule
    use rodyn_rod_profile, only: rod_profile, new_rod_profile, smallest_value
    use rodyn_switch_times, only: same_time
    use rodyn_text, only: short_text, to_text
@@ -250,14 +251,17 @@ contains
    subroutine check_solver(judge, config)
       class(key_judge), intent(inout) :: judge
       type(case_config), intent(in) :: config
+      type(method_type) :: method !! nameless: 'auto'
       character(len=:), allocatable :: rule
 
       if (.not. judge%is_sound('solver', 1, 'method')) return
-      rule = order_rule(config%solver%method, config%solver%order)
+      method = method_named(config%solver%method)
+      rule = order_rule(method, config%solver%order)
+      if (len_trim(method%name) == 0 .and. len(rule) > 0) rule = "goes with a method that is named; 'auto' chooses the order, too"
       if (len(rule) > 0 .and. judge%is_sound('solver', 1, 'order')) call judge%blame('solver', 1, 'order', rule)
       if (.not. config%solver%fixed_step > 0.0_wp) return
-      if (.not. any(config%solver%method == ['erk   ', 'dop853', 'gauss '])) then
-         call judge%blame('solver', 1, 'fixed_step', "is possible with method = 'erk', 'dop853' or 'gauss' only")
+      if (.not. method%fixed_steps) then
+         call judge%blame('solver', 1, 'fixed_step', 'is possible with method = '//list_of_methods(methods%fixed_steps)//' only')
       else if (.not. (judge%is_sound('case', 1, 't_end') .and. judge%is_sound('solver', 1, 'max_steps'))) then
          return
       else if (config%t_end/config%solver%max_steps > config%solver%fixed_step) then
@@ -265,28 +269,6 @@ contains
                     to_text(config%solver%max_steps)//' steps until t_end = '//short_text(config%t_end)//' [s]')
       end if
    end subroutine check_solver
-
-   !> What a method says against an order; empty if nothing.
-   pure function order_rule(method, order) result(rule)
-      character(len=*), intent(in) :: method
-      integer, intent(in) :: order !! 0: the method's own choice
-      character(len=:), allocatable :: rule
-
-      rule = ''
-      select case (method)
-      case ('auto')
-         if (order /= 0) rule = "goes with a method that is named; 'auto' chooses the order, too"
-      case ('bdf')
-         if (order > 5) rule = "must lie in 0..5 when method = 'bdf'"
-      case ('erk')
-         if (order == 1 .or. order > 8) rule = "must be 0 or lie in 2..8 when method = 'erk'"
-      case ('gauss')
-         if (order /= 0 .and. order /= 16) rule = "must be 0 or 16 when method = 'gauss'"
-      case ('dop853')
-         if (order /= 0 .and. order /= 8) rule = "must be 0 or 8 when method = 'dop853'"
-      case default ! 'adams' takes what the table allows
-      end select
-   end function order_rule
 
    !> A load on a node needs an existing node and is a force.
    subroutine check_target(judge, i, load, n_rods)

@@ -1,6 +1,7 @@
 !> The one table of all keys of a case file: checking, defaults and documentation come from it.
 module rodyn_case_schema
    use rodyn_kinds, only: wp
+   use rodyn_methods, only: method_words, methods
    use rodyn_schema, only: schema_group, schema_row, schema_extent, type_integer, type_real, type_logical, &
       type_word, type_text, any_list, positive, not_negative, at_least, in_range, between, up_to
    implicit none (type, external)
@@ -186,14 +187,14 @@ module rodyn_case_schema
          help='moment of dry friction'), &
       schema_row('hinge', 'friction_velocity', type_real, unit='rad/s', default='depends', rule=positive, &
          when='required when friction_moment > 0', help='rate up to which friction grows linearly'), &
-      schema_row('solver', 'method', type_word, default="'auto'", words='auto|adams|bdf|erk|dop853|gauss', &
+      schema_row('solver', 'method', type_word, default="'auto'", words='auto|'//method_words, &
          help='auto chooses; gauss, dop853: our own, order 16 and 8; erk: ARKODE; adams, bdf: CVODE, errors add up'), &
       schema_row('solver', 'rtol', type_real, default='1.0e-8', rule=between, low=0.0_wp, high=1.0_wp, &
          help='relative tolerance; at the end of a run errors may be up to 100 times that'), &
       schema_row('solver', 'atol', type_real, default='1.0e-10', rule=positive, &
          help='absolute tolerance of all states; zero would leave states at rest without a scale'), &
-      schema_row('solver', 'order', type_integer, default='0', rule=in_range, low=0.0_wp, high=12.0_wp, &
-         help="highest order, with a method named; 0: the choice of the method"), &
+      schema_row('solver', 'order', type_integer, default='0', rule=in_range, low=0.0_wp, &
+         high=real(maxval(methods%highest_order), wp), help="highest order, with a method named; 0: the choice of the method"), &
       schema_row('solver', 'max_step', type_real, unit='s', default='0.0', rule=not_negative, &
          help='longest step; 0: no bound'), &
       schema_row('solver', 'fixed_step', type_real, unit='s', default='0.0', rule=not_negative, &

@@ -4,6 +4,7 @@ module rodyn_case_notes
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: case_config, hinge_config, none_given
    use rodyn_kink_program, only: kink_set, new_kink_set
+   use rodyn_methods, only: method_named, method_type
    use rodyn_loads, only: is_zero, load_set, new_load_set
    use rodyn_switch_times, only: same_time
    use rodyn_text, only: formatted, tidy, to_text
@@ -32,13 +33,15 @@ contains
    subroutine note_method(config, text)
       type(case_config), intent(in) :: config
       character(len=:), allocatable, intent(inout) :: text
+      type(method_type) :: method
       logical :: vibrates
 
-      if (config%solver%method /= 'adams' .and. config%solver%method /= 'bdf') return
+      method = method_named(config%solver%method)
       vibrates = config%model%bending == 'dynamic'
       if (allocated(config%chain%hinge_stiffness)) vibrates = vibrates .or. any(config%chain%hinge_stiffness > 0.0_wp)
-      if (vibrates) call add(text, "method '"//trim(config%solver%method)//"': its errors add up from period to period of a "// &
-                             'vibration, to hundreds of rtol in a thousand; a smaller rtol shows them')
+      if (vibrates .and. method%multistep) call add(text, "method '"//trim(method%name)//"': its errors add up from period "// &
+                                                    'to period of a vibration, to hundreds of rtol in a thousand; '// &
+                                                    'a smaller rtol shows them')
    end subroutine note_method
 
    subroutine add(text, note)

@@ -11,6 +11,7 @@ module rodyn_cvode_integrator
    use, intrinsic :: iso_c_binding, only: c_ptr, c_int, c_long, c_double, c_null_ptr, c_associated, c_loc, c_funloc
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type, raise
+   use rodyn_methods, only: method_named, method_type
    use rodyn_text, only: time_text
    use rodyn_ode, only: ode_system, n_quadratures
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics, stricter
@@ -33,8 +34,6 @@ module rodyn_cvode_integrator
    implicit none (type, external)
    private
    public :: cvode_integrator, new_cvode_integrator
-
-   integer, parameter :: highest_adams = 12, highest_bdf = 5 !! orders
 
    !> Owns every handle of CVODE. Do not copy by assignment.
    type, extends(integrator_type) :: cvode_integrator
@@ -88,14 +87,8 @@ contains
 
       if (method /= 'adams' .and. method /= 'bdf') then
          call raise(error, 'method '''//method//''' is not one of CVODE''s: ''adams'' or ''bdf''')
-      else if (method == 'adams' .and. (options%order < 0 .or. options%order > highest_adams)) then
-         call raise(error, 'order: ''adams'' takes 1 to 12, or 0 for its highest')
-      else if (method == 'bdf' .and. (options%order < 0 .or. options%order > highest_bdf)) then
-         call raise(error, 'order: ''bdf'' takes 1 to 5, or 0 for its highest')
-      else if (options%fixed_step > 0.0_wp) then
-         call raise(error, 'fixed_step: '''//method//''' chooses its own steps; use ''erk''')
+         return
       end if
-      if (allocated(error)) return
 
       self%system => system
       self%options = options
@@ -116,11 +109,13 @@ contains
    pure type(solver_options) function inner_options(method, options)
       character(len=*), intent(in) :: method
       type(solver_options), intent(in) :: options
+      type(method_type) :: row
       real(wp) :: shorter
       integer :: order
 
       order = options%order
-      if (order == 0) order = merge(highest_adams, highest_bdf, method == 'adams')
+      row = method_named(method)
+      if (order == 0) order = row%highest_order
       if (method == 'adams') then
          shorter = 0.73_wp
       else
@@ -216,7 +211,7 @@ contains
       call check(error, FCVodeSetLinearSolver(self%memory, self%linear, self%matrix), 'CVodeSetLinearSolver')
       if (allocated(error)) return
       call check(error, FCVodeSetLinSysFn(self%memory, c_funloc(linear_system_shim)), 'CVodeSetLinSysFn')
-      if (allocated(error) .or. .not. self%options%stability_limit_detection) return
+      if (allocated(error)) return
       call check(error, FCVodeSetStabLimDet(self%memory, 1_c_int), 'CVodeSetStabLimDet')
    end subroutine attach_newton
 

@@ -56,10 +56,6 @@ contains
       type(solver_options), intent(in) :: options
       type(error_type), allocatable, intent(out) :: error
 
-      if (options%order /= 0 .and. options%order /= 8) then
-         call raise(error, "order: 'dop853' is of order 8")
-         return
-      end if
       self%system => system
       self%options = options
       self%inner = inner_options(options)

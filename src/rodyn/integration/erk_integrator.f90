@@ -33,7 +33,7 @@ module rodyn_erk_integrator
    private
    public :: erk_integrator, new_erk_integrator, erk_tableau
 
-   integer, parameter :: lowest_order = 2, highest_order = 8, default_order = 6
+   integer, parameter :: default_order = 6
    real(wp), parameter :: shorter = 0.56_wp !! steps than ARKODE would make with the user's tolerances
 
    !> struct ARKodeButcherTableMem of arkode_butcher.h
@@ -100,10 +100,6 @@ contains
 
       self%order = options%order
       if (self%order == 0) self%order = default_order
-      if (self%order < lowest_order .or. self%order > highest_order) then
-         call raise(error, 'order: ''erk'' takes 2 to 8, or 0 for 6')
-         return
-      end if
       self%system => system
       self%options = options
       allocate (self%data)

@@ -120,10 +120,6 @@ contains
       type(solver_options), intent(in) :: options
       type(error_type), allocatable, intent(out) :: error
 
-      if (options%order /= 0 .and. options%order /= 16) then
-         call raise(error, "order: 'gauss' is of order 16")
-         return
-      end if
       select type (system)
       class is (mechanical_system)
          self%mechanics => system

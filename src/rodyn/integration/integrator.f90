@@ -14,24 +14,13 @@
 module rodyn_integrator
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type, raise, exit_stopped
+   use rodyn_methods, only: solver_options
    use rodyn_ode, only: ode_system
    use rodyn_text, only: time_text
    implicit none (type, external)
    private
    public :: integrator_type, solver_options, solver_statistics, monitor_type
    public :: stricter, judged_steps, is_hopeless, hopeless_text
-
-   !> What the user chooses of a method.
-   type :: solver_options
-      real(wp) :: rtol = 1.0e-8_wp       !! relative tolerance, > 0
-      real(wp) :: atol = 1.0e-10_wp      !! absolute tolerance of every controlled state, > 0
-      integer :: order = 0               !! highest order of a multistep method, order of a one-step method; 0: the default
-      real(wp) :: max_step = 0.0_wp      !! [s]; 0: no bound
-      real(wp) :: fixed_step = 0.0_wp    !! [s], one-step methods only; 0: adaptive
-      logical :: allow_unstable = .false. !! fixed steps beyond the stability limit, see `rodyn_step_limit`
-      integer :: max_steps = 1000000000  !! internal steps of the whole run, restarts included
-      logical :: stability_limit_detection = .true. !! BDF: lower the order where orders 3 to 5 are unstable
-   end type solver_options
 
    !> Counts over the whole run, restarts included.
    type :: solver_statistics

@@ -2,6 +2,7 @@
 module rodyn_integrators
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type, raise
+   use rodyn_methods, only: list_of_methods, method_named, method_type, methods, order_rule
    use rodyn_ode, only: ode_system
    use rodyn_integrator, only: integrator_type, solver_options
    use rodyn_cvode_integrator, only: cvode_integrator, new_cvode_integrator
@@ -11,10 +12,7 @@ module rodyn_integrators
    use rodyn_sundials_base, only: sundials_version
    implicit none (type, external)
    private
-   public :: new_integrator, integrator_names, sundials_version
-
-   !> What `method` may be.
-   character(len=6), parameter :: integrator_names(5) = [character(len=6) :: 'adams', 'bdf', 'erk', 'dop853', 'gauss']
+   public :: new_integrator, sundials_version
 
 contains
 
@@ -22,7 +20,7 @@ contains
    subroutine new_integrator(integrator, system, method, options, error)
       class(integrator_type), allocatable, intent(out) :: integrator
       class(ode_system), target, intent(inout) :: system !! must outlive the integrator
-      character(len=*), intent(in) :: method             !! one of `integrator_names`
+      character(len=*), intent(in) :: method             !! one of `rodyn_methods`
       type(solver_options), intent(in) :: options
       type(error_type), allocatable, intent(out) :: error
 
@@ -31,7 +29,7 @@ contains
       type(dop853_integrator), allocatable :: dop853
       type(gauss_integrator), allocatable :: gauss
 
-      call check_options(options, error)
+      call check_options(method_named(method), options, error)
       if (allocated(error)) return
       select case (method)
       case ('adams', 'bdf')
@@ -51,12 +49,13 @@ contains
          call new_gauss_integrator(gauss, system, options, error)
          call move_alloc(gauss, integrator)
       case default
-         call raise(error, 'no integrator is called '''//trim(method)//'''; there are adams, bdf, erk, dop853 and gauss')
+         call raise(error, 'no integrator is called '''//trim(method)//'''; there are '//list_of_methods(methods%name /= ''))
       end select
    end subroutine new_integrator
 
-   !> What no method can work with.
-   subroutine check_options(options, error)
+   !> What no method can work with, or this one cannot.
+   subroutine check_options(method, options, error)
+      type(method_type), intent(in) :: method !! nameless: unknown
       type(solver_options), intent(in) :: options
       type(error_type), allocatable, intent(out) :: error
       if (.not. options%rtol > 0.0_wp) then
@@ -69,6 +68,12 @@ contains
          call raise(error, 'fixed_step: must not be negative')
       else if (options%max_steps < 1) then
          call raise(error, 'max_steps: must be at least 1')
+      else if (len_trim(method%name) == 0) then
+         return
+      else if (len(order_rule(method, options%order)) > 0) then
+         call raise(error, 'order: '//order_rule(method, options%order))
+      else if (options%fixed_step > 0.0_wp .and. .not. method%fixed_steps) then
+         call raise(error, "fixed_step: '"//trim(method%name)//"' chooses its own steps")
       end if
    end subroutine check_options
 

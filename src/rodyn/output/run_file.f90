@@ -15,6 +15,7 @@ module rodyn_run_file
    use rodyn_errors, only: error_type, raise
    use rodyn_hdf5_files, only: hdf5_file
    use rodyn_kinds, only: i8, wp
+   use rodyn_methods, only: solver_options
    use rodyn_posix, only: path_exists, remove_file
    use rodyn_result_file, only: check_output_path, provenance, result_file, text_or_empty
    use rodyn_run_layout, only: i_alpha, i_alpha_rate, i_angular_momentum, i_beta, i_beta_rate, i_bubble, i_bubble_rate, &
@@ -80,14 +81,10 @@ module rodyn_run_file
 
    !> What the integrator did; the attributes of the group `solver`.
    type :: solver_report
-      character(len=:), allocatable :: method     !! the one used: 'adams', 'bdf', 'erk'
+      character(len=:), allocatable :: method     !! those used
       character(len=:), allocatable :: reason     !! why it was chosen
       character(len=:), allocatable :: kernel     !! 'recursive' or 'assembled'
-      integer :: order = 0                        !! highest order allowed
-      real(wp) :: rtol = 0.0_wp                   !! relative tolerance
-      real(wp) :: atol = 0.0_wp                   !! absolute tolerance
-      real(wp) :: max_step = 0.0_wp               !! [s]; 0: no bound
-      real(wp) :: fixed_step = 0.0_wp             !! [s]; 0: adaptive
+      type(solver_options) :: options             !! of the case
       real(wp) :: last_step = 0.0_wp              !! [s]
       integer(i8) :: n_steps = 0_i8
       integer(i8) :: n_rhs = 0_i8                 !! right-hand sides
@@ -478,11 +475,11 @@ contains
       call put_text('method', text_or_empty(report%method))
       call put_text('reason', text_or_empty(report%reason))
       call put_text('kernel', text_or_empty(report%kernel))
-      if (.not. allocated(error)) call self%file%put_attribute(solver_group, 'order', report%order, error)
-      call put_real('rtol', report%rtol)
-      call put_real('atol', report%atol)
-      call put_real('max_step', report%max_step)
-      call put_real('fixed_step', report%fixed_step)
+      if (.not. allocated(error)) call self%file%put_attribute(solver_group, 'order', report%options%order, error)
+      call put_real('rtol', report%options%rtol)
+      call put_real('atol', report%options%atol)
+      call put_real('max_step', report%options%max_step)
+      call put_real('fixed_step', report%options%fixed_step)
       call put_real('last_step', report%last_step)
       call put_count('n_steps', report%n_steps)
       call put_count('n_rhs', report%n_rhs)

@@ -14,7 +14,7 @@ module rodyn_run
    use rodyn_integrator, only: solver_statistics
    use rodyn_integrators, only: sundials_version
    use rodyn_lapack, only: use_one_thread
-   use rodyn_driver, only: driver_type, new_driver, options_of
+   use rodyn_driver, only: driver_type, new_driver
    use rodyn_simulation, only: observer_type, even_times, simulate
    use rodyn_ledger, only: fill_row
    use rodyn_run_needs, only: check_needs
@@ -89,8 +89,7 @@ contains
       motion%events%most = config%solver%max_events
       call initial_state(motion, config%initial, y)
       progress = new_progress(0.0_wp, config%t_end, silent)
-      call new_driver(driver, motion, y, trim(config%solver%method), options_of(config), config%t_end, config%n_outputs, error, &
-                      progress)
+      call new_driver(driver, motion, y, config%solver, config%t_end, config%n_outputs, error, progress)
       if (allocated(error) .and. present(name)) error%message = name//': '//error%message
       if (allocated(error)) return
       header%notes = joined_lines(case_notes(config, .true.), notes_on(scene, y(:scene%n_dof), config%output%ledger))
@@ -156,7 +155,7 @@ contains
       call new_motion(motion, scene, .false., error)
       if (allocated(error)) return
       call initial_state(motion, config%initial, y)
-      call check_fixed_step(trim(config%solver%method), options_of(config), scene, y, config%t_end, error)
+      call check_fixed_step(trim(config%solver%method), config%solver%solver_options, scene, y, config%t_end, error)
       if (allocated(error)) error%message = name//': '//error%message
    end subroutine check_steps
 
@@ -201,11 +200,7 @@ contains
       report%method = driver%methods()
       report%reason = driver%reason()
       report%kernel = trim(merge('assembled', 'recursive', motion%dynamics%scene%assembled))
-      report%order = config%solver%order
-      report%rtol = config%solver%rtol
-      report%atol = config%solver%atol
-      report%max_step = config%solver%max_step
-      report%fixed_step = config%solver%fixed_step
+      report%options = config%solver%solver_options
       report%last_step = stats%last_step
       report%n_steps = stats%n_steps
       report%n_rhs = stats%n_rhs

@@ -11,7 +11,7 @@ module rodyn_driver
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type, exit_stopped
-   use rodyn_case_config, only: case_config
+   use rodyn_case_config, only: solver_config
    use rodyn_text, only: time_text
    use rodyn_integrator, only: integrator_type, monitor_type, solver_options, solver_statistics
    use rodyn_integrators, only: new_integrator
@@ -21,7 +21,7 @@ module rodyn_driver
    use rodyn_step_limit, only: check_fixed_step
    implicit none (type, external)
    private
-   public :: driver_type, new_driver, options_of
+   public :: driver_type, new_driver
 
    real(wp), parameter :: probation = 1500.0_wp   !! right-hand sides of explicit steps that are not worth a choice
    real(wp), parameter :: short_probation = 300.0_wp !! likewise where it is known already: what BDF needs to get going
@@ -94,19 +94,18 @@ module rodyn_driver
 contains
 
    !> Choose the method for a motion that has not begun.
-   subroutine new_driver(driver, motion, y, method, options, t_end, n_outputs, error, monitor)
+   subroutine new_driver(driver, motion, y, solver, t_end, n_outputs, error, monitor)
       type(driver_type), intent(out) :: driver
       type(motion_type), target, intent(inout) :: motion !! must outlive the driver
       real(wp), contiguous, intent(in) :: y(:)    !! state at t = 0
-      character(len=*), intent(in) :: method      !! of the case
-      type(solver_options), intent(in) :: options
+      type(solver_config), intent(in) :: solver   !! of the case
       real(wp), intent(in) :: t_end               !! of the run [s]
       integer, intent(in) :: n_outputs            !! states that are wanted
       type(error_type), allocatable, intent(out) :: error
       class(monitor_type), target, intent(inout), optional :: monitor !! must outlive the driver
 
       driver%motion => motion
-      driver%options = options
+      driver%options = solver%solver_options
       driver%t_end = t_end
       driver%n_outputs = n_outputs
       driver%history = ''
@@ -114,10 +113,10 @@ contains
       driver%used = ''
       allocate (driver%verdicts(0))
       if (present(monitor)) call driver%set_monitor(monitor)
-      if (method == 'auto') then
+      if (solver%method == 'auto') then
          call choose_first(driver, y, error)
       else
-         driver%choice = named_method(trim(method), options)
+         driver%choice = named_method(trim(solver%method), solver%solver_options)
       end if
       if (.not. allocated(error)) &
          call check_fixed_step(driver%choice%method, driver%choice%options, motion%dynamics%scene, y, t_end, error)
@@ -606,16 +605,5 @@ contains
       end do
       nullify (self%motion, self%monitor)
    end subroutine finalize
-
-   !> The user's choices, for the integrator.
-   function options_of(config) result(options)
-      type(case_config), intent(in) :: config
-      type(solver_options) :: options
-      associate (solver => config%solver)
-         options = solver_options(rtol=solver%rtol, atol=solver%atol, order=solver%order, max_step=solver%max_step, &
-                                  fixed_step=solver%fixed_step, allow_unstable=solver%allow_unstable, &
-                                  max_steps=solver%max_steps)
-      end associate
-   end function options_of
 
 end module rodyn_driver

@@ -7,7 +7,7 @@ module rodyn_sweep_case
    use rodyn_case_config, only: case_config
    use rodyn_case_reader, only: case_from_document
    use rodyn_errors, only: error_type, raise, exit_stopped
-   use rodyn_driver, only: driver_type, new_driver, options_of
+   use rodyn_driver, only: driver_type, new_driver
    use rodyn_integrator, only: monitor_type, solver_statistics
    use rodyn_ledger, only: fill_row
    use rodyn_linear_model, only: linear_model
@@ -287,7 +287,7 @@ contains
       call initial_state(motion, config%initial, y)
       monitor = new_monitor(sweep, pulse, clock_start, late)
       call merge_times(config, sweep%probe_times, shape%outputs, times, keeper%probe_of, keeper%output_of)
-      call new_driver(driver, motion, y, trim(config%solver%method), options_of(config), t_end, size(times), error, monitor)
+      call new_driver(driver, motion, y, config%solver, t_end, size(times), error, monitor)
       nullify (driver%monitor)
       if (allocated(error)) return
       if (driver%choice%tried) then

@@ -11,6 +11,7 @@ module rodyn_sweep_worker
    use rodyn_lanes, only: lanes
    use rodyn_driver, only: driver_type
    use rodyn_method_choice, only: method_choice
+   use rodyn_methods, only: method_named, method_type
    use rodyn_scene, only: scene_type
    use rodyn_sweep_case, only: case_result, case_shape, clear_result, conclude_case, integrate_case, keep_final, keeper_type, &
       prepare_case, pulse_type
@@ -254,8 +255,10 @@ contains
 
    pure logical function goes_in_lane(case)
       type(lane_case), intent(in) :: case
+      type(method_type) :: method
+      method = method_named(case%choice%method)
       goes_in_lane = .false.
-      if (case%choice%method == 'dop853' .and. suits_lane_dop853(case%choice%options)) &
+      if (method%in_lanes .and. suits_lane_dop853(case%choice%options)) &
          goes_in_lane = suits_lanes(case%motion%dynamics%scene)
    end function goes_in_lane
 
