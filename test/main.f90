@@ -30,6 +30,7 @@ program tester
    use test_namelist_fuzz, only: collect_namelist_fuzz
    use test_progress, only: collect_progress
    use test_quadrature, only: collect_quadrature
+   use test_quantities, only: collect_quantities
    use test_rod_profiles, only: collect_rod_profiles
    use test_run_file, only: collect_run_file
    use test_schema, only: collect_schema
@@ -74,6 +75,7 @@ program tester
    call run('method_choice', collect_method_choice)
    call run('driver', collect_driver)
    call run('step_limit', collect_step_limit)
+   call run('quantities', collect_quantities)
    call run('validity', collect_validity)
    call run('progress', collect_progress)
    call run('namelist', collect_namelist)

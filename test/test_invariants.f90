@@ -6,7 +6,6 @@ module test_invariants
    use rodyn_case_reader, only: read_case
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_frequencies, only: natural_frequencies
-   use rodyn_run_file, only: run_row
    use test_testing, only: unittest, new_test, check, check_close
    use rodyn_motion, only: motion_type, new_motion, initial_state
    use test_random_scenes, only: allocate_case, random_case, seed_random, kind_name, n_kinds

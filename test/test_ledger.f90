@@ -11,7 +11,7 @@ module test_ledger
    use rodyn_motion, only: motion_type, new_motion, initial_state
    use rodyn_integrator, only: integrator_type, monitor_type, solver_options
    use rodyn_integrators, only: new_integrator
-   use rodyn_run_file, only: new_run_row
+   use rodyn_quantities, only: layout_of, new_row
    use rodyn_simulation, only: listed_times, simulate
    use test_testing, only: unittest, new_test, check
    use test_random_scenes, only: allocate_case
@@ -326,7 +326,9 @@ contains
       call initial_state(motion%motion_type, config%initial, y)
       call new_integrator(integrator, motion, method, solver_options(), error)
       if (allocated(error)) return
-      result%rows = spread(new_run_row(scene%n), 1, 2)
+      allocate (result%rows(2))
+      config%output%ledger = ledger
+      result%row = new_row(layout_of(config))
       call simulate(motion%motion_type, integrator, listed_times([0.0_wp, config%t_end]), config%t_end, result, y, t, error)
       call integrator%finalize()
       n_calls = motion%n_calls

@@ -2,12 +2,13 @@
 module test_run_file
    use, intrinsic :: ieee_arithmetic, only: ieee_positive_inf, ieee_value
    use, intrinsic :: iso_fortran_env, only: int64
+   use rodyn_case_config, only: case_config
    use rodyn_errors, only: error_type, exit_bad_input
    use rodyn_hdf5_files, only: hdf5_file
    use rodyn_kinds, only: i8, wp
    use rodyn_posix, only: path_exists
-   use rodyn_run_file, only: check_output_path, is_finite, new_run_row, run_file, run_header, run_row, solver_report
-   use rodyn_run_layout, only: n_run_variables, run_variables
+   use rodyn_quantities, only: is_finite, layout_of, new_row, row_layout, row_type
+   use rodyn_run_file, only: check_output_path, run_file, run_header, solver_report
    use test_scratch, only: clean, scratch_path
    use test_testing, only: check, check_close, new_test, unittest
    implicit none (type, external)
@@ -35,7 +36,7 @@ contains
          new_test('a result that appears meanwhile is left alone', test_race), &
          new_test('a missing directory and a directory as file are refused', test_bad_paths), &
          new_test('a run file is used after finish only with an error', test_closed), &
-         new_test('an infinite number of any rod is found', test_finite)]
+         new_test('an infinite number is found wherever it stands', test_finite)]
    end subroutine collect_run_file
 
    !> A file of made-up rows: entry i of data set k at row r is value(k, i, r).
@@ -47,7 +48,7 @@ contains
       logical, intent(in), optional :: force
       type(error_type), allocatable :: failure
       type(run_file) :: run
-      type(run_row) :: row
+      type(row_type) :: row
       integer :: r
       logical :: forced
 
@@ -55,7 +56,7 @@ contains
       if (present(force)) forced = force
       call run%create(path, sample_header(n_rods, merge(n_rows, 0, expect_rows), ledger), forced, error)
       if (allocated(error)) return
-      row = new_run_row(n_rods)
+      row = new_row(sample_layout(n_rods, ledger))
       do r = 1, n_rows
          call fill(row, r)
          call run%append(row, failure)
@@ -77,11 +78,21 @@ contains
       header%input = "&case title = 'A sample' /"//new_line('a')//repeat('! a long input'//new_line('a'), 10000)
       header%resolved_input = "&case title = 'A sample', t_end = 1.0 /"
       header%sundials_version = '6.4.1'
-      header%n_rods = n_rods
+      header%layout = sample_layout(n_rods, ledger)
       header%n_rows = n_rows
-      header%ledger = ledger
-      header%bubbles = .true.
    end function sample_header
+
+   !> Everything that a row can have.
+   function sample_layout(n_rods, ledger) result(layout)
+      integer, intent(in) :: n_rods
+      logical, intent(in) :: ledger
+      type(row_layout) :: layout
+      type(case_config) :: config
+      config%chain%n_rods = n_rods
+      config%model%bending_shapes = 3
+      config%output%ledger = ledger
+      layout = layout_of(config)
+   end function sample_layout
 
    function sample_report() result(report)
       type(solver_report) :: report
@@ -105,35 +116,16 @@ contains
    end function value
 
    subroutine fill(row, r)
-      type(run_row), intent(inout) :: row
+      type(row_type), intent(inout) :: row
       integer, intent(in) :: r
-      integer :: i
+      integer :: i, k
 
       row%time = 0.001_wp*real(r - 1, wp)
-      do i = 1, size(row%phi)
-         row%phi(i) = value(2, i, r)
-         row%alpha(i) = value(3, i, r)
-         row%beta(i) = value(4, i, r)
-         row%phi_rate(i) = value(5, i, r)
-         row%alpha_rate(i) = value(6, i, r)
-         row%beta_rate(i) = value(7, i, r)
-         row%bubble(i) = value(22, i, r)
-         row%bubble_rate(i) = value(23, i, r)
+      do k = 1, size(row%layout%quantities)
+         associate (x => row%layout%quantities(k))
+            row%values(x%first:x%last) = [(value(k, i, r), i=1, x%last - x%first + 1)]
+         end associate
       end do
-      row%velocity_x = value(8, 1, r)
-      row%velocity_y = value(9, 1, r)
-      row%omega = value(10, 1, r)
-      row%displacement_x = value(11, 1, r)
-      row%displacement_y = value(12, 1, r)
-      row%rotation = value(13, 1, r)
-      row%energy_kinetic = value(14, 1, r)
-      row%energy_elastic = value(15, 1, r)
-      row%energy_dissipated = value(16, 1, r)
-      row%work_external = value(17, 1, r)
-      row%energy_residual = value(18, 1, r)
-      row%momentum_x = value(19, 1, r)
-      row%momentum_y = value(20, 1, r)
-      row%angular_momentum = value(21, 1, r)
    end subroutine fill
 
    !> Does the file hold exactly the sample's rows?
@@ -142,28 +134,31 @@ contains
       integer, intent(in) :: n_rods, n_rows
       type(error_type), allocatable, intent(out) :: error
       type(hdf5_file) :: file
-      real(wp), allocatable :: scalars(:), rods(:, :)
+      type(row_layout) :: layout
+      real(wp), allocatable :: numbers(:), table(:, :)
       character(len=:), allocatable :: text
       integer :: i, k, r
 
       call file%open(path, error)
       if (allocated(error)) return
-      do k = 1, n_run_variables
-         if (run_variables(k)%per_rod) then
-            call file%read(trim(run_variables(k)%name), rods, error)
+      layout = sample_layout(n_rods, .true.)
+      call file%read('time', numbers, error)
+      if (allocated(error)) return
+      call check_close(error, numbers, [(0.001_wp*real(r - 1, wp), r=1, n_rows)], exact, 'time')
+      do k = 1, size(layout%quantities)
+         associate (x => layout%quantities(k))
             if (allocated(error)) return
-            call check_close(error, [rods], [((value(k, i, r), i=1, n_rods), r=1, n_rows)], exact, run_variables(k)%name)
-         else
-            call file%read(trim(run_variables(k)%name), scalars, error)
-            if (allocated(error)) return
-            if (k == 1) then
-               call check_close(error, scalars, [(0.001_wp*real(r - 1, wp), r=1, n_rows)], exact, 'time')
+            if (x%along > 0) then
+               call file%read(trim(x%name), table, error)
+               if (.not. allocated(error)) numbers = [table]
             else
-               call check_close(error, scalars, [(value(k, 1, r), r=1, n_rows)], exact, run_variables(k)%name)
+               call file%read(trim(x%name), numbers, error)
             end if
-         end if
-         if (allocated(error)) return
+            if (allocated(error)) return
+            call check_close(error, numbers, [((value(k, i, r), i=1, x%last - x%first + 1), r=1, n_rows)], exact, x%name)
+         end associate
       end do
+      if (allocated(error)) return
       call file%get_attribute('/', 'status', text, error)
       if (allocated(error)) return
       call check(error, text, 'done', 'status')
@@ -205,6 +200,7 @@ contains
    subroutine test_no_ledger(error)
       type(error_type), allocatable, intent(out) :: error
       type(hdf5_file) :: file
+      type(row_layout) :: layout, without
       character(len=:), allocatable :: path
       integer :: k
 
@@ -214,9 +210,14 @@ contains
          if (allocated(error)) exit work
          call file%open(path, error)
          if (allocated(error)) exit work
-         do k = 1, n_run_variables
-            call check(error, file%exists(trim(run_variables(k)%name)) .neqv. run_variables(k)%ledger, run_variables(k)%name)
+         layout = sample_layout(2, .true.)
+         without = sample_layout(2, .false.)
+         call check(error, size(without%quantities), size(layout%quantities) - 8, 'quantities of the ledger')
+         do k = 1, size(layout%quantities)
             if (allocated(error)) exit work
+            associate (name => layout%quantities(k)%name)
+               call check(error, file%exists(trim(name)) .eqv. any(without%quantities%name == name), name)
+            end associate
          end do
       end block work
       call clean(path)
@@ -225,7 +226,7 @@ contains
    subroutine test_failed_run(error)
       type(error_type), allocatable, intent(out) :: error
       type(run_file) :: run
-      type(run_row) :: row
+      type(row_type) :: row
       type(hdf5_file) :: file
       character(len=:), allocatable :: path, text
       integer(int64), allocatable :: extent(:)
@@ -233,7 +234,7 @@ contains
       integer(i8) :: n_steps
 
       path = scratch_path('failed.h5')
-      row = new_run_row(2)
+      row = new_row(sample_layout(2, .true.))
       work: block
          call run%create(path, sample_header(2, 1001, .true.), .false., error)
          if (allocated(error)) exit work
@@ -278,7 +279,7 @@ contains
       work: block
          call run%create(path, sample_header(2, 3, .true.), .false., error)
          if (allocated(error)) exit work
-         call run%append(new_run_row(2), error)
+         call run%append(new_row(sample_layout(2, .true.)), error)
          if (allocated(error)) exit work
          call check(error, .not. path_exists(path), 'the final name exists too early')
          if (allocated(error)) exit work
@@ -342,7 +343,7 @@ contains
          logical, intent(in) :: is_earlier     !! a longer one is there
          character(len=*), intent(in) :: name  !! of the file that has the rows
          type(run_file) :: run
-         type(run_row) :: row
+         type(row_type) :: row
          type(run_header) :: header
          integer :: i
 
@@ -350,7 +351,7 @@ contains
          header%resolved_input = input
          call run%create(scratch_path('running.h5'), header, .false., error)
          if (allocated(error)) return
-         row = new_run_row(2)
+         row = new_row(sample_layout(2, .true.))
          do i = 1, n_rows
             row%time = i
             call run%append(row, error)
@@ -418,7 +419,7 @@ contains
          if (allocated(error)) exit work
          call write_sample_run(path, 1, 2, .true., .true., error)
          if (allocated(error)) exit work
-         call run%append(new_run_row(1), error)
+         call run%append(new_row(sample_layout(1, .true.)), error)
          if (allocated(error)) exit work
          call run%finish('done', sample_report(), refusal)
          call check(error, allocated(refusal), 'the other result was replaced')
@@ -466,7 +467,7 @@ contains
       type(error_type), allocatable :: refusal
       type(run_file) :: run
 
-      call run%append(new_run_row(1), refusal)
+      call run%append(new_row(sample_layout(1, .true.)), refusal)
       call check(error, allocated(refusal), 'a row went nowhere')
       if (allocated(error)) return
       call run%finish('done', sample_report(), refusal)
@@ -475,28 +476,19 @@ contains
 
    subroutine test_finite(error)
       type(error_type), allocatable, intent(out) :: error
-      type(run_row), target :: row
+      type(row_type) :: row
       real(wp) :: infinite
-      logical :: found(8)
+      integer :: i
 
       infinite = ieee_value(1.0_wp, ieee_positive_inf)
-      row = new_run_row(2)
+      row = new_row(sample_layout(2, .true.))
       call check(error, is_finite(row), 'a row of zeros is not finite')
-      if (allocated(error)) return
-      found = [seen(row%phi), seen(row%alpha), seen(row%beta), seen(row%bubble), seen(row%phi_rate), seen(row%alpha_rate), &
-               seen(row%beta_rate), seen(row%bubble_rate)]
-      call check(error, all(found), 'not seen')
-
-   contains
-
-      !> Is it found in this part of the row?
-      logical function seen(x)
-         real(wp), target, intent(inout) :: x(:)
-         x(2) = infinite
-         seen = .not. is_finite(row)
-         x(2) = 0.0_wp
-      end function seen
-
+      do i = 1, size(row%values)
+         if (allocated(error)) return
+         row%values(i) = infinite
+         call check(error, .not. is_finite(row), 'not seen')
+         row%values(i) = 0.0_wp
+      end do
    end subroutine test_finite
 
 end module test_run_file

@@ -125,8 +125,7 @@ contains
       type(case_shape), intent(out) :: shape
       integer :: i
 
-      shape%n_rods = 1
-      shape%n_states = 12
+      shape%layout%n_values = 12
       shape%n_probes = 2
       shape%n_modes = 3
       kept%case = 3

@@ -4,7 +4,7 @@ module test_validity
    use rodyn_errors, only: error_type
    use rodyn_case_config, only: case_config
    use rodyn_scene, only: scene_type, new_scene
-   use rodyn_run_file, only: run_row, new_run_row
+   use rodyn_quantities, only: layout_of, new_row, row_layout, row_type
    use rodyn_validity, only: validity_type, new_validity, greatest_deflection
    use test_random_scenes, only: allocate_case
    use test_testing, only: unittest, new_test, check, check_close
@@ -64,24 +64,41 @@ contains
       call new_scene(scene, config, error)
    end function one_rod
 
+   !> Rows of one rod.
+   function layout()
+      type(row_layout) :: layout
+      type(case_config) :: config
+      config%chain%n_rods = 1
+      layout = layout_of(config)
+   end function layout
+
+   !> Bend the rod to an arc.
+   subroutine bend(row, slope, rate)
+      type(row_type), intent(inout) :: row
+      real(wp), intent(in) :: slope !! at the inner end [rad]
+      real(wp), intent(in) :: rate  !! of it [rad/s]
+      row%values(row%layout%before('alpha') + 1) = slope
+      row%values(row%layout%before('beta') + 1) = -slope
+      row%values(row%layout%before('alpha_rate') + 1) = rate
+      row%values(row%layout%before('beta_rate') + 1) = -rate
+   end subroutine bend
+
    !> An arc of deflection f l has slopes 4 f.
    subroutine limit_of_deflection(error)
       type(error_type), allocatable, intent(out) :: error
       type(validity_type) :: validity
-      type(run_row) :: row
+      type(row_type) :: row
 
-      validity = new_validity(one_rod('dynamic'), 0.05_wp)
-      row = new_run_row(1)
-      row%alpha = 4.0_wp*0.0499_wp
-      row%beta = -row%alpha
+      validity = new_validity(one_rod('dynamic'), layout(), 0.05_wp)
+      row = new_row(layout())
+      call bend(row, 4.0_wp*0.0499_wp, 0.0_wp)
       call validity%observe(row)
       call check(error, validity%warnings(), '', 'below the limit')
       if (allocated(error)) return
       row%time = 2.5_wp
-      row%alpha = 4.0_wp*0.0701_wp
-      row%beta = -row%alpha
+      call bend(row, 4.0_wp*0.0701_wp, 0.0_wp)
       call validity%observe(row)
-      row%alpha = 0.0_wp
+      call bend(row, 0.0_wp, 0.0_wp)
       call validity%observe(row)
       call check(error, index(validity%warnings(), 'rod 1 bends by 0.07 of its length (t = 2.5 s)') == 1, validity%warnings())
    end subroutine limit_of_deflection
@@ -125,19 +142,16 @@ contains
       real(wp), intent(in) :: amplitude !! of the slopes [rad]
       character(len=:), allocatable :: warnings
       type(validity_type) :: validity
-      type(run_row) :: row
+      type(row_type) :: row
       real(wp), parameter :: own = 24.674011002723393_wp ! (pi/2)^2 10
       integer :: i
 
-      validity = new_validity(one_rod('dynamic'), 1.0_wp)
-      row = new_run_row(1)
-      row%phi_rate = 1.0_wp
+      validity = new_validity(one_rod('dynamic'), layout(), 1.0_wp)
+      row = new_row(layout())
+      row%values(row%layout%before('phi_rate') + 1) = 1.0_wp
       do i = 1, 500
          row%time = 0.1_wp*i
-         row%alpha = 0.05_wp + amplitude*cos(part*own*row%time)
-         row%beta = -row%alpha
-         row%alpha_rate = -amplitude*part*own*sin(part*own*row%time)
-         row%beta_rate = -row%alpha_rate
+         call bend(row, 0.05_wp + amplitude*cos(part*own*row%time), -amplitude*part*own*sin(part*own*row%time))
          call validity%observe(row)
       end do
       warnings = validity%warnings()
@@ -146,11 +160,11 @@ contains
    subroutine rigid_rods(error)
       type(error_type), allocatable, intent(out) :: error
       type(validity_type) :: validity
-      type(run_row) :: row
+      type(row_type) :: row
 
-      validity = new_validity(one_rod('rigid'), 1.0e-3_wp)
-      row = new_run_row(1)
-      row%alpha = 1.0_wp
+      validity = new_validity(one_rod('rigid'), layout(), 1.0e-3_wp)
+      row = new_row(layout())
+      call bend(row, 1.0_wp, 0.0_wp)
       call validity%observe(row)
       call check(error, validity%warnings(), '', 'warned of')
    end subroutine rigid_rods

@@ -1,4 +1,4 @@
-!> The result of one run as an HDF5 file; `rodyn_run_layout` has the names in it.
+!> The result of one run as an HDF5 file; `rodyn_quantities` has what is in it.
 !>
 !>     call check_output_path(path, force, error)      ! early, before computing
 !>     call run%create(path, header, force, error)
@@ -17,16 +17,14 @@ module rodyn_run_file
    use rodyn_kinds, only: i8, wp
    use rodyn_methods, only: solver_options
    use rodyn_posix, only: path_exists, remove_file
+   use rodyn_quantities, only: chain_axes, entries, row_layout, row_type
    use rodyn_result_file, only: check_output_path, provenance, result_file, text_or_empty
-   use rodyn_run_layout, only: i_alpha, i_alpha_rate, i_angular_momentum, i_beta, i_beta_rate, i_bubble, i_bubble_rate, &
-      i_displacement_x, i_displacement_y, i_energy_dissipated, i_energy_elastic, i_energy_kinetic, i_energy_residual, &
-      i_momentum_x, &
-      i_momentum_y, i_omega, i_phi, i_phi_rate, i_rotation, i_time, i_velocity_x, i_velocity_y, i_work_external, &
-      n_run_variables, run_coordinates, run_variables, solver_group, events_group
    use rodyn_text, only: short_text, to_text
    implicit none (type, external)
    private
-   public :: run_file, run_header, run_row, solver_report, new_run_row, is_finite, check_output_path
+   public :: run_file, run_header, solver_report, check_output_path
+
+   character(len=*), parameter :: solver_group = 'solver', events_group = 'events'
 
    integer, parameter :: block_bytes = 2*1024*1024 !! memory for rows that wait to be written
    integer, parameter :: most_block_rows = 4096
@@ -45,39 +43,10 @@ module rodyn_run_file
 
    !> What is known before the first row.
    type, extends(provenance) :: run_header
-      integer :: n_rods = 0       !! n
+      type(row_layout) :: layout
       integer :: n_rows = 0       !! rows to expect; 0: unknown. Only sizes the blocks
-      logical :: ledger = .true.  !! with energies and momenta
-      logical :: bubbles = .false. !! with the third bending shape
       integer :: compression = 4  !! gzip level, 0..9
    end type run_header
-
-   !> State and ledger at one output time; what the scene has not is zero or slaved.
-   type :: run_row
-      real(wp) :: time = 0.0_wp                !! [s]
-      real(wp), allocatable :: phi(:)          !! chord angles (n) [rad]
-      real(wp), allocatable :: alpha(:)        !! inner end slopes (n) [rad]
-      real(wp), allocatable :: beta(:)         !! outer end slopes (n) [rad]
-      real(wp), allocatable :: phi_rate(:)     !! (n) [rad/s]
-      real(wp), allocatable :: alpha_rate(:)   !! (n) [rad/s]
-      real(wp), allocatable :: beta_rate(:)    !! (n) [rad/s]
-      real(wp), allocatable :: bubble(:)       !! deflections by the third bending shape in mid-rod (n) [m]
-      real(wp), allocatable :: bubble_rate(:)  !! (n) [m/s]
-      real(wp) :: velocity_x = 0.0_wp          !! moving frame [m/s]
-      real(wp) :: velocity_y = 0.0_wp          !! moving frame [m/s]
-      real(wp) :: omega = 0.0_wp               !! [rad/s]
-      real(wp) :: displacement_x = 0.0_wp      !! moving frame [m]
-      real(wp) :: displacement_y = 0.0_wp      !! moving frame [m]
-      real(wp) :: rotation = 0.0_wp            !! [rad]
-      real(wp) :: energy_kinetic = 0.0_wp      !! [J]
-      real(wp) :: energy_elastic = 0.0_wp      !! [J]
-      real(wp) :: energy_dissipated = 0.0_wp   !! [J]
-      real(wp) :: work_external = 0.0_wp       !! [J]
-      real(wp) :: energy_residual = 0.0_wp     !! [J]
-      real(wp) :: momentum_x = 0.0_wp          !! inertial frame [kg m/s]
-      real(wp) :: momentum_y = 0.0_wp          !! inertial frame [kg m/s]
-      real(wp) :: angular_momentum = 0.0_wp    !! inertial frame [kg m^2/s]
-   end type run_row
 
    !> What the integrator did; the attributes of the group `solver`.
    type :: solver_report
@@ -98,20 +67,11 @@ module rodyn_run_file
       character(len=:), allocatable :: warnings   !! where the model does not hold, one line each; a root attribute
    end type solver_report
 
-   !> Rows of one data set that wait to be written.
-   type :: column
-      logical :: used = .false.
-      real(wp), allocatable :: rods(:, :)   !! (n, block_rows)
-      real(wp), allocatable :: scalars(:)   !! (block_rows)
-   end type column
-
    type, extends(result_file) :: run_file
-      logical, private :: ledger = .true.
-      logical, private :: bubbles = .false.
-      integer, private :: n_rods = 0
+      type(row_layout), private :: layout
       integer, private :: block_rows = 0
       integer, private :: compression = 0
-      integer, private :: waiting = 0                  !! rows in the columns
+      integer, private :: waiting = 0                  !! rows in the block
       integer, private :: written = 0                  !! of them, in the file already
       integer, private :: n_blocks = 0                 !! that are full and in the file
       real(wp), private :: last_time = 0.0_wp          !! of the last row in the file [s]
@@ -119,7 +79,8 @@ module rodyn_run_file
       character(len=:), allocatable, private :: resolved_input
       character(len=:), allocatable, private :: no_room !! why a row or the events are not in the file
       character(len=:), allocatable, private :: lost   !! why the file was given up
-      type(column), private :: columns(n_run_variables)
+      real(wp), allocatable, private :: times(:)       !! of the block (block_rows) [s]
+      real(wp), allocatable, private :: values(:, :)   !! (layout%n_values, block_rows)
    contains
       procedure :: create
       procedure :: append
@@ -137,30 +98,6 @@ module rodyn_run_file
    end type run_file
 
 contains
-
-   !> A row of zeros for a chain of n rods. Make one and use it for all times.
-   pure function new_run_row(n_rods) result(row)
-      integer, intent(in) :: n_rods
-      type(run_row) :: row
-
-      allocate (row%phi(n_rods), row%alpha(n_rods), row%beta(n_rods), source=0.0_wp)
-      allocate (row%phi_rate(n_rods), row%alpha_rate(n_rods), row%beta_rate(n_rods), source=0.0_wp)
-      allocate (row%bubble(n_rods), row%bubble_rate(n_rods), source=0.0_wp)
-   end function new_run_row
-
-   !> Are all numbers of a row finite?
-   pure logical function is_finite(row)
-      type(run_row), intent(in) :: row
-      real(wp), parameter :: most = huge(1.0_wp)
-
-      is_finite = all(abs([row%velocity_x, row%velocity_y, row%omega, row%displacement_x, row%displacement_y, row%rotation, &
-                           row%energy_kinetic, row%energy_elastic, row%energy_dissipated, row%work_external, &
-                           row%energy_residual, row%momentum_x, row%momentum_y, row%angular_momentum]) <= most)
-      is_finite = is_finite .and. all(abs(row%phi) <= most) .and. all(abs(row%phi_rate) <= most)
-      is_finite = is_finite .and. all(abs(row%alpha) <= most) .and. all(abs(row%alpha_rate) <= most)
-      is_finite = is_finite .and. all(abs(row%beta) <= most) .and. all(abs(row%beta_rate) <= most)
-      is_finite = is_finite .and. all(abs(row%bubble) <= most) .and. all(abs(row%bubble_rate) <= most)
-   end function is_finite
 
    !> The rows of a stopped run get a name of their own, so that the same call can be made again: PATH, or PATH-1, PATH-2, ...
    !> behind what is not theirs to replace. Where there are some of the same case already, the more stay: `earlier` is true if
@@ -219,12 +156,8 @@ contains
       logical, intent(in) :: force                        !! `finish` may replace an existing file
       type(error_type), allocatable, intent(out) :: error
       character(len=:), allocatable :: failure
-      integer :: i
-      logical :: used
 
-      self%ledger = header%ledger
-      self%bubbles = header%bubbles
-      self%n_rods = header%n_rods
+      self%layout = header%layout
       self%block_rows = rows_per_block(header)
       self%compression = header%compression
       self%waiting = 0
@@ -236,15 +169,12 @@ contains
       self%clock_written = self%clock_start
       if (allocated(self%lost)) deallocate (self%lost)
       if (allocated(self%no_room)) deallocate (self%no_room)
-      do i = 1, n_run_variables
-         used = self%ledger .or. .not. run_variables(i)%ledger
-         if (i == i_bubble .or. i == i_bubble_rate) used = self%bubbles
-         self%columns(i) = new_column(header, run_variables(i)%per_rod, used)
-      end do
+      if (allocated(self%values)) deallocate (self%times, self%values)
+      allocate (self%times(self%block_rows), self%values(self%layout%n_values, self%block_rows))
 
       call self%begin(path, force, error)
       if (allocated(error)) return
-      failure = self%reserve(bytes_at_end + n_run_variables*bytes_of_layout + len(text_or_empty(header%input)) &
+      failure = self%reserve(bytes_at_end + n_sets(self%layout)*bytes_of_layout + len(text_or_empty(header%input)) &
                              + len(self%resolved_input) + len(text_or_empty(header%notes)))
       if (len(failure) > 0) call raise(error, path//': cannot be written: '//failure)
       if (.not. allocated(error)) call self%write_layout(header%compression, error)
@@ -279,41 +209,14 @@ contains
    !> Add one row. It is copied; blocks of rows are written as they fill.
    subroutine append(self, row, error)
       class(run_file), intent(inout) :: self
-      type(run_row), intent(in) :: row
+      type(row_type), intent(in) :: row !! of the layout of the header
       type(error_type), allocatable, intent(out) :: error
 
       call self%check_open(error)
       if (allocated(error)) return
       self%waiting = self%waiting + 1
-      associate (at => self%waiting, columns => self%columns)
-         columns(i_time)%scalars(at) = row%time
-         columns(i_phi)%rods(:, at) = row%phi
-         columns(i_alpha)%rods(:, at) = row%alpha
-         columns(i_beta)%rods(:, at) = row%beta
-         columns(i_phi_rate)%rods(:, at) = row%phi_rate
-         columns(i_alpha_rate)%rods(:, at) = row%alpha_rate
-         columns(i_beta_rate)%rods(:, at) = row%beta_rate
-         columns(i_velocity_x)%scalars(at) = row%velocity_x
-         columns(i_velocity_y)%scalars(at) = row%velocity_y
-         columns(i_omega)%scalars(at) = row%omega
-         columns(i_displacement_x)%scalars(at) = row%displacement_x
-         columns(i_displacement_y)%scalars(at) = row%displacement_y
-         columns(i_rotation)%scalars(at) = row%rotation
-         if (self%bubbles) then
-            columns(i_bubble)%rods(:, at) = row%bubble
-            columns(i_bubble_rate)%rods(:, at) = row%bubble_rate
-         end if
-         if (self%ledger) then
-            columns(i_energy_kinetic)%scalars(at) = row%energy_kinetic
-            columns(i_energy_elastic)%scalars(at) = row%energy_elastic
-            columns(i_energy_dissipated)%scalars(at) = row%energy_dissipated
-            columns(i_work_external)%scalars(at) = row%work_external
-            columns(i_energy_residual)%scalars(at) = row%energy_residual
-            columns(i_momentum_x)%scalars(at) = row%momentum_x
-            columns(i_momentum_y)%scalars(at) = row%momentum_y
-            columns(i_angular_momentum)%scalars(at) = row%angular_momentum
-         end if
-      end associate
+      self%times(self%waiting) = row%time
+      self%values(:, self%waiting) = row%values
       if (self%waiting == self%block_rows .or. self%flush_is_due()) call self%write_waiting_rows(error)
    end subroutine append
 
@@ -428,42 +331,30 @@ contains
       integer, intent(in) :: compression !! gzip level
       type(error_type), allocatable, intent(out) :: error
       character(len=:), allocatable :: name
-      integer :: i, k
+      integer :: i
 
-      do i = 1, size(run_coordinates)
-         associate (coordinate => run_coordinates(i))
-            name = trim(coordinate%name)
-            call self%file%write(name, [(coordinate%first + k, k=0, self%n_rods + coordinate%beyond_n - 1)], compression, error)
-            if (.not. allocated(error)) call self%describe(name, '1', trim(coordinate%long_name), error)
-            if (.not. allocated(error)) call self%file%make_scale(name, error)
-            if (allocated(error)) return
+      do i = 1, size(chain_axes)
+         name = trim(chain_axes(i)%name)
+         call self%file%write(name, entries(chain_axes(i), self%layout%n_rods), compression, error)
+         if (.not. allocated(error)) call self%describe(name, '1', trim(chain_axes(i)%long_name), error)
+         if (.not. allocated(error)) call self%file%make_scale(name, error)
+         if (allocated(error)) return
+      end do
+      call self%file%create_series('time', [integer ::], self%block_rows, compression, error)
+      if (.not. allocated(error)) call self%describe('time', 's', 'time', error)
+      if (.not. allocated(error)) call self%file%make_scale('time', error)
+      do i = 1, size(self%layout%quantities)
+         associate (x => self%layout%quantities(i))
+            name = trim(x%name)
+            if (.not. allocated(error)) call self%file%create_series(name, self%layout%row_shape(i), self%block_rows, compression, &
+                                                                     error)
+            if (.not. allocated(error)) call self%describe(name, trim(x%units), trim(x%long_name), error)
+            if (x%along > 0 .and. .not. allocated(error)) &
+               call self%file%attach_scale(name, 1, trim(chain_axes(x%along)%name), error)
+            if (.not. allocated(error)) call self%file%attach_scale(name, merge(2, 1, x%along > 0), 'time', error)
          end associate
       end do
-
-      do i = 1, n_run_variables
-         if (.not. self%columns(i)%used) cycle
-         associate (variable => run_variables(i))
-            name = trim(variable%name)
-            if (variable%per_rod) then
-               call self%file%create_series(name, [self%n_rods], self%block_rows, compression, error)
-            else
-               call self%file%create_series(name, [integer ::], self%block_rows, compression, error)
-            end if
-            if (.not. allocated(error)) call self%describe(name, trim(variable%units), trim(variable%long_name), error)
-            if (allocated(error)) return
-            if (i == i_time) then
-               call self%file%make_scale(name, error)
-            else if (variable%per_rod) then
-               call self%file%attach_scale(name, 1, 'rod', error)
-               if (.not. allocated(error)) call self%file%attach_scale(name, 2, 'time', error)
-            else
-               call self%file%attach_scale(name, 1, 'time', error)
-            end if
-            if (allocated(error)) return
-         end associate
-      end do
-
-      call self%file%create_group(solver_group, error)
+      if (.not. allocated(error)) call self%file%create_group(solver_group, error)
    end subroutine write_layout
 
    !> The attributes of the group `solver`.
@@ -487,7 +378,7 @@ contains
       call put_count('n_nonlinear_failures', report%n_nonlinear_failures)
       call put_count('n_error_test_failures', report%n_error_test_failures)
       call put_count('n_restarts', report%n_restarts)
-      if (self%ledger) then
+      if (self%layout%before('work_external') >= 0) then
          call put_real('work_external_error', report%work_external_error)
          call put_real('energy_dissipated_error', report%energy_dissipated_error)
       end if
@@ -549,11 +440,10 @@ contains
       integer(i8) :: row_bytes, rest
       integer :: nodes !! that the index of each data set may need now
 
-      row_bytes = bytes_per_real*(count(run_variables%per_rod .and. self%columns%used)*int(self%n_rods, i8) &
-                                  + count(.not. run_variables%per_rod .and. self%columns%used))
+      row_bytes = bytes_per_real*(self%layout%n_values + 1_i8)
       nodes = merge(3, merge(1, 0, self%written == 0 .and. self%n_blocks == 0), &
                     self%n_blocks > 0 .and. modulo(self%n_blocks, chunks_per_node) == 0)
-      rest = bytes_at_end + count(self%columns%used)*nodes*bytes_of_node
+      rest = bytes_at_end + n_sets(self%layout)*nodes*bytes_of_node
       rows = most
       failure = ''
       do
@@ -573,13 +463,16 @@ contains
       integer :: i
 
       associate (first => self%written + 1)
-         do i = 1, n_run_variables
-            if (.not. self%columns(i)%used .or. allocated(error)) cycle
-            if (run_variables(i)%per_rod) then
-               call self%file%append(trim(run_variables(i)%name), self%columns(i)%rods(:, first:last), error)
-            else
-               call self%file%append(trim(run_variables(i)%name), self%columns(i)%scalars(first:last), error)
-            end if
+         call self%file%append('time', self%times(first:last), error)
+         do i = 1, size(self%layout%quantities)
+            associate (x => self%layout%quantities(i))
+               if (allocated(error)) cycle
+               if (x%along > 0) then
+                  call self%file%append(trim(x%name), self%values(x%first:x%last, first:last), error)
+               else
+                  call self%file%append(trim(x%name), self%values(x%first, first:last), error)
+               end if
+            end associate
          end do
       end associate
       if (.not. allocated(error)) call self%file%flush(error)
@@ -589,34 +482,23 @@ contains
       end if
       self%worth_keeping = .true.
       self%written = last
-      self%last_time = self%columns(i_time)%scalars(last)
+      self%last_time = self%times(last)
       call system_clock(self%clock_written)
    end subroutine write_rows
 
-   !> Memory for one block of one data set.
-   pure function new_column(header, per_rod, used) result(entry)
-      type(run_header), intent(in) :: header
-      logical, intent(in) :: per_rod !! (rod, time), otherwise (time)
-      logical, intent(in) :: used    !! the file has this data set
-      type(column) :: entry
-
-      entry%used = used
-      if (.not. used) return
-      if (per_rod) then
-         allocate (entry%rods(header%n_rods, rows_per_block(header)), source=0.0_wp)
-      else
-         allocate (entry%scalars(rows_per_block(header)), source=0.0_wp)
-      end if
-   end function new_column
+   !> Data sets that grow: time and the quantities.
+   pure integer function n_sets(layout)
+      type(row_layout), intent(in) :: layout
+      n_sets = 1 + size(layout%quantities)
+   end function n_sets
 
    !> Rows per block and chunk: as many as the memory for waiting rows allows, in blocks of about equal size.
    pure function rows_per_block(header) result(rows)
       type(run_header), intent(in) :: header
       integer :: rows
-      integer :: numbers, n_blocks
+      integer :: n_blocks
 
-      numbers = count(run_variables%per_rod)*header%n_rods + count(.not. run_variables%per_rod)
-      rows = max(1, min(most_block_rows, block_bytes/(numbers*bytes_per_real)))
+      rows = max(1, min(most_block_rows, block_bytes/bytes_per_real/(header%layout%n_values + 1)))
       if (header%n_rows > 0) then
          n_blocks = (header%n_rows - 1)/rows + 1
          rows = (header%n_rows - 1)/n_blocks + 1

@@ -10,8 +10,8 @@
 !>   How fast is told by the mean squares of its deflection, without the mean, and of its rate, both weighed by the bending energy.
 module rodyn_validity
    use rodyn_kinds, only: wp
+   use rodyn_quantities, only: row_layout, row_type
    use rodyn_scene, only: scene_type
-   use rodyn_run_file, only: run_row
    use rodyn_text, only: to_text, time_text
    implicit none (type, external)
    private
@@ -38,6 +38,7 @@ module rodyn_validity
    type :: validity_type
       real(wp) :: deflection_limit = 0.0_wp
       integer :: n_seen = 0 !! rows
+      integer :: alpha = 0, beta = 0, alpha_rate = 0, beta_rate = 0, phi_rate = 0, omega = 0 !! where they begin in a row, less one
       type(rod_record), allocatable :: rods(:) !! (n); none if rods do not bend
    contains
       procedure :: observe
@@ -47,13 +48,20 @@ module rodyn_validity
 contains
 
    !> Nothing seen yet of the rods of a scene.
-   function new_validity(scene, deflection_limit) result(self)
+   function new_validity(scene, layout, deflection_limit) result(self)
       type(scene_type), intent(in) :: scene
+      type(row_layout), intent(in) :: layout   !! of the rows
       real(wp), intent(in) :: deflection_limit !! of v/l
       type(validity_type) :: self
       integer :: k
 
       self%deflection_limit = deflection_limit
+      self%alpha = layout%before('alpha')
+      self%beta = layout%before('beta')
+      self%alpha_rate = layout%before('alpha_rate')
+      self%beta_rate = layout%before('beta_rate')
+      self%phi_rate = layout%before('phi_rate')
+      self%omega = layout%before('omega')
       allocate (self%rods(merge(scene%n, 0, scene%dynamic_bending .or. scene%quasistatic)))
       do k = 1, size(self%rods)
          associate (rod => scene%rods(scene%rod_of(k)), seen => self%rods(k))
@@ -67,14 +75,15 @@ contains
    !> Look at an output.
    pure subroutine observe(self, row)
       class(validity_type), intent(inout) :: self
-      type(run_row), intent(in) :: row
+      type(row_type), intent(in) :: row
       real(wp) :: deflection
       integer :: k
 
       self%n_seen = self%n_seen + 1
       do k = 1, size(self%rods)
-         associate (seen => self%rods(k), a => row%alpha(k), b => row%beta(k), ar => row%alpha_rate(k), br => row%beta_rate(k), &
-                    w => row%omega + row%phi_rate(k))
+         associate (seen => self%rods(k), a => row%values(self%alpha + k), b => row%values(self%beta + k), &
+                    ar => row%values(self%alpha_rate + k), br => row%values(self%beta_rate + k), &
+                    w => row%values(self%omega + 1) + row%values(self%phi_rate + k))
             deflection = greatest_deflection(a, b)
             if (deflection > seen%deflection) then
                seen%deflection = deflection

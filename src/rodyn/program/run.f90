@@ -16,9 +16,9 @@ module rodyn_run
    use rodyn_lapack, only: use_one_thread
    use rodyn_driver, only: driver_type, new_driver
    use rodyn_simulation, only: observer_type, even_times, simulate
-   use rodyn_ledger, only: fill_row
+   use rodyn_quantities, only: row_type, fill_row, is_finite, layout_of, new_row
    use rodyn_run_needs, only: check_needs
-   use rodyn_run_file, only: run_file, run_header, run_row, solver_report, new_run_row, is_finite, check_output_path
+   use rodyn_run_file, only: run_file, run_header, solver_report, check_output_path
    use rodyn_progress, only: progress_monitor, new_progress
    use rodyn_description, only: describe_scene
    use rodyn_notes, only: notes_on
@@ -30,12 +30,13 @@ module rodyn_run
    private
    public :: run_case, check_steps
 
-   !> Takes rows down into the run file.
+   !> Writes rows into the run file.
    type, extends(observer_type) :: recorder_type
       type(run_file) :: file
-      type(run_row) :: row
+      type(row_type) :: row
       real(wp) :: initial_energy = 0.0_wp !! kinetic + elastic at t = 0 [J]
       logical :: started = .false.
+      integer :: kinetic = 0, elastic = 0, residual = 0 !! places of energies in the row; 0: no ledger
       real(wp) :: worst_residual = 0.0_wp !! of the ledger [J]
       real(wp) :: energy_scale = 0.0_wp   !! largest energy so far [J]
       type(validity_type) :: validity
@@ -106,16 +107,17 @@ contains
       header%input = ''
       header%resolved_input = resolved_case(config)
       header%sundials_version = sundials_version()
-      header%n_rods = scene%n
+      header%layout = layout_of(config)
       header%n_rows = config%n_outputs + 1
-      header%ledger = config%output%ledger
-      header%bubbles = config%model%bending_shapes == 3
       header%compression = config%output%compression
       if (present(input_text)) header%input = input_text
       call recorder%file%create(path, header, replace, error)
       if (allocated(error)) return
-      recorder%row = new_run_row(scene%n)
-      recorder%validity = new_validity(scene, config%model%deflection_limit)
+      recorder%row = new_row(header%layout)
+      recorder%kinetic = header%layout%before('energy_kinetic') + 1
+      recorder%elastic = header%layout%before('energy_elastic') + 1
+      recorder%residual = header%layout%before('energy_residual') + 1
+      recorder%validity = new_validity(scene, header%layout, config%model%deflection_limit)
       call simulate(motion, driver, even_times(config%t_end, config%n_outputs), config%t_end, recorder, y, t, failure)
       call progress%finish()
       call system_clock(clock_end)
@@ -159,7 +161,7 @@ contains
       if (allocated(error)) error%message = name//': '//error%message
    end subroutine check_steps
 
-   !> Take down one row.
+   !> Write one row.
    subroutine observe(self, motion, t, y, error)
       class(recorder_type), intent(inout) :: self
       type(motion_type), intent(in) :: motion
@@ -178,8 +180,12 @@ contains
          call raise(error, 'at t = '//time_text(t)//' s: states or energies beyond all numbers')
          return
       end if
-      self%worst_residual = max(self%worst_residual, abs(self%row%energy_residual))
-      self%energy_scale = max(self%energy_scale, self%row%energy_kinetic + self%row%energy_elastic)
+      if (self%residual > 0) then
+         associate (x => self%row%values)
+            self%worst_residual = max(self%worst_residual, abs(x(self%residual)))
+            self%energy_scale = max(self%energy_scale, x(self%kinetic) + x(self%elastic))
+         end associate
+      end if
       call self%validity%observe(self%row)
       call self%file%append(self%row, error)
    end subroutine observe

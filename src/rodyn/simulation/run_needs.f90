@@ -4,6 +4,7 @@ module rodyn_run_needs
    use rodyn_case_config, only: case_config
    use rodyn_errors, only: error_type, raise, exit_bad_input
    use rodyn_posix, only: parent_directory
+   use rodyn_quantities, only: numbers_that_change
    use rodyn_resources, only: free_disk, free_memory, byte_text
    use rodyn_text, only: to_text
    implicit none (type, external)
@@ -14,7 +15,7 @@ module rodyn_run_needs
    real(wp), parameter :: matrices = 4.75_wp           !! n_dof x n_dof, of the assembled kernel
    !> Whatever the scene; OpenBLAS takes 134 MB at its first call, and without them would wait for ever [bytes].
    real(wp), parameter :: of_program = 1.5e8_wp
-   real(wp), parameter :: least_compressed = 0.7_wp    !! of the size of states that move
+   real(wp), parameter :: least_compressed = 0.7_wp    !! of the size of numbers that change
 
 contains
 
@@ -30,7 +31,7 @@ contains
       memory = of_program + memory_of_scene(config)
       call check_memory('n_rods = '//to_text(config%chain%n_rods)//", kernel = '"//trim(config%model%kernel)//"'", memory, error)
       if (allocated(error)) return
-      disk = word*rows*states_that_move(config)
+      disk = word*rows*(1.0_wp + numbers_that_change(config))
       if (config%output%compression > 0) disk = disk*least_compressed
       if (disk > free_disk(parent_directory(path))) &
          call raise(error, path//': n_outputs = '//to_text(config%n_outputs)//' rows of '//to_text(config%chain%n_rods)// &
@@ -71,14 +72,5 @@ contains
       end select
       if (config%model%bending /= 'dynamic') bytes_per_rod = 0.4_wp*bytes_per_rod
    end function bytes_per_rod
-
-   !> Numbers of a row that change with time and so hardly compress.
-   pure real(wp) function states_that_move(config)
-      type(case_config), intent(in) :: config
-      states_that_move = 1.0_wp + 2.0_wp*config%chain%n_rods
-      if (config%model%bending /= 'rigid') &
-         states_that_move = states_that_move + 2.0_wp*config%model%bending_shapes*config%chain%n_rods
-      if (config%spacecraft%motion == 'free') states_that_move = states_that_move + 6.0_wp
-   end function states_that_move
 
 end module rodyn_run_needs

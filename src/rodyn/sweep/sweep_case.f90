@@ -9,15 +9,14 @@ module rodyn_sweep_case
    use rodyn_errors, only: error_type, raise, exit_stopped
    use rodyn_driver, only: driver_type, new_driver
    use rodyn_integrator, only: monitor_type, solver_statistics
-   use rodyn_ledger, only: fill_row
    use rodyn_linear_model, only: linear_model
    use rodyn_modes_at_start, only: modes_at_start
    use rodyn_modes, only: mode_set
    use rodyn_motion, only: motion_type, new_motion, initial_state
    use rodyn_namelist_document, only: namelist_document
    use rodyn_namelist_edit, only: set_value
+   use rodyn_quantities, only: row_layout, row_type, fill_row, layout_of, new_row, resized
    use rodyn_rod_profile, only: mean_mass_factors
-   use rodyn_run_file, only: run_row, new_run_row
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_switch_times, only: same_time
    use rodyn_simulation, only: observer_type, listed_times, simulate
@@ -36,17 +35,14 @@ module rodyn_sweep_case
 
    !> Sizes that all cases of a sweep have in common.
    type :: case_shape
-      integer :: n_rods = 0   !! of the longest chain; shorter ones end in NaN
       integer :: n_modes = 0  !! natural frequencies that are kept
-      integer :: n_per_rod = 6 !! phi, alpha, beta, their rates; 8: and bubble and its rate, if some case has them
-      integer :: n_states = 0 !! n_per_rod n_rods + 6: those, then velocity, displacement and rotation; 0 where nothing is
-                              !! integrated
+      type(row_layout) :: layout !! of a row of the longest chain, shorter ones end in NaN; empty where nothing is integrated
       integer :: n_probes = 0
       integer :: n_rows = 0   !! of the longest series; 0: no series are kept
       logical :: outputs = .false. !! the states at the n_outputs times are made, whether they are kept or not
    end type case_shape
 
-   !> What is kept of a case. States in the order of `case_shape`.
+   !> What is kept of a case. Rows as the layout of `case_shape` says.
    type :: case_result
       integer :: case = 0
       integer :: status = status_stopped
@@ -58,10 +54,10 @@ module rodyn_sweep_case
       character(len=:), allocatable :: message
       real(wp), allocatable :: frequency(:)   !! natural frequencies (n_modes) [rad/s]; NaN beyond the last
       real(wp), allocatable :: damping_ratio(:) !! (n_modes)
-      real(wp), allocatable :: final(:)       !! (n_states)
-      real(wp), allocatable :: probes(:, :)   !! (n_states, n_probes); NaN beyond the end of the case
+      real(wp), allocatable :: final(:)       !! (n_values)
+      real(wp), allocatable :: probes(:, :)   !! (n_values, n_probes); NaN beyond the end of the case
       real(wp), allocatable :: times(:)       !! (n_rows) [s]; NaN beyond the last row
-      real(wp), allocatable :: series(:, :)   !! (n_states, n_rows)
+      real(wp), allocatable :: series(:, :)   !! (n_values, n_rows)
    end type case_result
 
    !> Someone who is shown about 50 times a second that work goes on, and may want it stopped.
@@ -90,10 +86,10 @@ module rodyn_sweep_case
       procedure :: stop_requested
    end type case_monitor
 
-   !> Takes down the states that are kept.
+   !> Keeps the states that are wanted.
    type, extends(observer_type) :: keeper_type
-      type(run_row) :: row
-      integer :: n_rods = 0                  !! of the sweep
+      type(row_type) :: row                  !! of the case
+      type(row_layout) :: layout             !! of the sweep
       integer, allocatable :: probe_of(:)    !! of each time; 0: none
       integer, allocatable :: output_of(:)   !! row of the series of each time; 0: none
       logical :: keep_series = .false.
@@ -112,29 +108,33 @@ contains
    subroutine new_case_shape(shape, sweep)
       type(case_shape), intent(out) :: shape
       type(sweep_config), intent(in) :: sweep
-      integer :: a, n_outputs
+      type(case_config) :: config !! with the largest of all values
+      integer :: a
 
+      config = sweep%base_case
+      config%output%ledger = .false.
       shape%n_modes = sweep%frequencies
-      shape%n_rods = sweep%base_case%chain%n_rods
-      if (sweep%base_case%model%bending_shapes == 3) shape%n_per_rod = 8
-      n_outputs = sweep%base_case%n_outputs
       shape%outputs = sweep%keep_series
       do a = 1, size(sweep%axes)
          select case (sweep%axes(a)%key)
          case ('chain.n_rods')
-            shape%n_rods = nint(maxval(sweep%axes(a)%numbers))
+            config%chain%n_rods = nint(maxval(sweep%axes(a)%numbers))
          case ('model.bending_shapes')
-            if (nint(maxval(sweep%axes(a)%numbers)) == 3) shape%n_per_rod = 8
+            config%model%bending_shapes = max(config%model%bending_shapes, nint(maxval(sweep%axes(a)%numbers)))
          case ('case.n_outputs')
-            n_outputs = nint(maxval(sweep%axes(a)%numbers))
+            config%n_outputs = nint(maxval(sweep%axes(a)%numbers))
             shape%outputs = .true.
          case default ! changes no size
          end select
       end do
-      if (.not. sweep%integrate) return
-      shape%n_states = shape%n_per_rod*shape%n_rods + 6
+      if (.not. sweep%integrate) then
+         shape%layout%n_rods = config%chain%n_rods
+         allocate (shape%layout%quantities(0))
+         return
+      end if
+      shape%layout = layout_of(config)
       shape%n_probes = size(sweep%probe_times)
-      if (sweep%keep_series) shape%n_rows = n_outputs + 1
+      if (sweep%keep_series) shape%n_rows = config%n_outputs + 1
    end subroutine new_case_shape
 
    !> The configuration of case number `case`.
@@ -220,9 +220,9 @@ contains
    subroutine allocate_result(kept, shape)
       type(case_result), intent(inout) :: kept
       type(case_shape), intent(in) :: shape
-      allocate (kept%frequency(shape%n_modes), kept%damping_ratio(shape%n_modes), kept%final(shape%n_states))
-      allocate (kept%probes(shape%n_states, shape%n_probes))
-      allocate (kept%times(shape%n_rows), kept%series(shape%n_states, shape%n_rows))
+      allocate (kept%frequency(shape%n_modes), kept%damping_ratio(shape%n_modes), kept%final(shape%layout%n_values))
+      allocate (kept%probes(shape%layout%n_values, shape%n_probes))
+      allocate (kept%times(shape%n_rows), kept%series(shape%layout%n_values, shape%n_rows))
    end subroutine allocate_result
 
    !> Ready for a case.
@@ -294,9 +294,9 @@ contains
          if (monitor%stop_requested()) call raise(error, 'stopped on request at t = 0 s', exit_stopped)
          if (allocated(error)) return
       end if
-      keeper%row = new_run_row(scene%n)
-      keeper%validity = new_validity(scene, config%model%deflection_limit)
-      keeper%n_rods = shape%n_rods
+      keeper%layout = shape%layout
+      keeper%row = new_row(resized(shape%layout, scene%n))
+      keeper%validity = new_validity(scene, keeper%row%layout, config%model%deflection_limit)
       keeper%t_end = t_end
       keeper%n_outputs = config%n_outputs
       keeper%keep_series = sweep%keep_series
@@ -374,7 +374,7 @@ contains
       call fill_row(motion, t_end, y, 0.0_wp, keeper%row)
       call keeper%validity%observe(keeper%row)
       keeper%kept%message = in_one_line(keeper%validity%warnings())
-      call place(keeper%row, keeper%n_rods, keeper%kept%final)
+      call place(keeper%row, keeper%layout, keeper%kept%final)
    end subroutine keep_final
 
    !> Two texts, each of which may be empty.
@@ -499,33 +499,24 @@ contains
       if (probe == 0 .and. .not. self%keep_series) return
       call fill_row(motion, t, y, 0.0_wp, self%row)
       call self%validity%observe(self%row)
-      if (probe > 0) call place(self%row, self%n_rods, self%kept%probes(:, probe))
+      if (probe > 0) call place(self%row, self%layout, self%kept%probes(:, probe))
       if (output == 0 .or. .not. self%keep_series) return
       self%kept%times(output) = t
-      call place(self%row, self%n_rods, self%kept%series(:, output))
+      call place(self%row, self%layout, self%kept%series(:, output))
    end subroutine observe
 
-   !> A row in the order of `case_shape`.
-   pure subroutine place(row, n_rods, state)
-      type(run_row), intent(in) :: row
-      integer, intent(in) :: n_rods
-      real(wp), intent(inout) :: state(:) !! (n_states); what the row has not is left as it is
-      integer :: last, n
+   !> A row of a case among those of the sweep.
+   pure subroutine place(row, layout, values)
+      type(row_type), intent(in) :: row
+      type(row_layout), intent(in) :: layout !! of the sweep: the same quantities, of as many rods or more
+      real(wp), intent(inout) :: values(:)   !! what the row has not is left as it is
+      integer :: i
 
-      n = size(row%phi)
-      state(1:n) = row%phi
-      state(n_rods + 1:n_rods + n) = row%alpha
-      state(2*n_rods + 1:2*n_rods + n) = row%beta
-      state(3*n_rods + 1:3*n_rods + n) = row%phi_rate
-      state(4*n_rods + 1:4*n_rods + n) = row%alpha_rate
-      state(5*n_rods + 1:5*n_rods + n) = row%beta_rate
-      last = size(state) - 6
-      if (last == 8*n_rods) then
-         state(6*n_rods + 1:6*n_rods + n) = row%bubble
-         state(7*n_rods + 1:7*n_rods + n) = row%bubble_rate
-      end if
-      state(last + 1:) = [row%velocity_x, row%velocity_y, row%omega, &
-                          row%displacement_x, row%displacement_y, row%rotation]
+      do i = 1, size(layout%quantities)
+         associate (from => row%layout%quantities(i), first => layout%quantities(i)%first)
+            values(first:first + from%last - from%first) = row%values(from%first:from%last)
+         end associate
+      end do
    end subroutine place
 
    function new_monitor(sweep, pulse, clock_start, late) result(monitor)

@@ -188,7 +188,7 @@ contains
       if (.not. allocated(error)) call new_plan(engine%plan, engine%sweep, error)
       if (allocated(error)) return
       call new_case_shape(engine%shape, engine%sweep)
-      call check_memory('n_rods = '//to_text(engine%shape%n_rods)//', '//to_text(engine%plan%n_cases)//' cases, '// &
+      call check_memory('n_rods = '//to_text(engine%shape%layout%n_rods)//', '//to_text(engine%plan%n_cases)//' cases, '// &
                         to_text(engine%shape%n_rows)//' rows of series', memory_of_sweep(engine), error)
 
    contains
@@ -205,10 +205,10 @@ contains
    pure real(wp) function memory_of_sweep(engine)
       type(engine_type), intent(in) :: engine
       real(wp), parameter :: word = 8.0_wp, of_any_case = 64.0_wp
-      real(wp) :: numbers, n_states
+      real(wp) :: numbers
 
-      n_states = real(engine%shape%n_states, wp)
-      numbers = n_states*(1.0_wp + engine%shape%n_probes + engine%shape%n_rows) + engine%shape%n_rows
+      numbers = real(engine%shape%layout%n_values, wp)*(1.0_wp + engine%shape%n_probes + engine%shape%n_rows) + &
+                engine%shape%n_rows
       if (engine%shape%outputs) numbers = numbers + 2.0_wp*engine%sweep%base_case%n_outputs
       memory_of_sweep = of_program + of_any_case*engine%plan%n_cases + (memory_of_scene(engine%sweep%base_case) + word*numbers)* &
                         min(merge(lanes, 1, uses_lanes(engine%sweep, engine%plan)), engine%plan%n_cases)

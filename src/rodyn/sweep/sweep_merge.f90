@@ -10,8 +10,7 @@ module rodyn_sweep_merge
    use rodyn_hdf5_files, only: hdf5_file, hdf5_version
    use rodyn_integrators, only: sundials_version
    use rodyn_posix, only: ignore_signal, path_exists, remove_file, sigxfsz, sync_path
-   use rodyn_run_layout, only: i_alpha, i_alpha_rate, i_beta, i_beta_rate, i_bubble, i_bubble_rate, i_displacement_x, &
-      i_displacement_y, i_omega, i_phi, i_phi_rate, i_rotation, i_velocity_x, i_velocity_y, run_variables
+   use rodyn_quantities, only: chain_axes, entries, quantity
    use rodyn_sweep_case, only: allocate_result, case_result, case_shape, status_done
    use rodyn_sweep_config, only: sweep_config
    use rodyn_sweep_index, only: sweep_index
@@ -21,9 +20,6 @@ module rodyn_sweep_merge
    private
    public :: merge_sweep
 
-   integer, parameter :: per_rod(8) = [i_phi, i_alpha, i_beta, i_phi_rate, i_alpha_rate, i_beta_rate, i_bubble, &
-                                    i_bubble_rate] !! the first `case_shape%n_per_rod` of these
-   integer, parameter :: scalars(6) = [i_velocity_x, i_velocity_y, i_omega, i_displacement_x, i_displacement_y, i_rotation]
    integer, parameter :: block_bytes = 4*1024*1024 !! memory for the states of a block of cases
    integer, parameter :: most_block_cases = 4096
    integer, parameter :: longest_message = 1000 !! [bytes]
@@ -32,10 +28,10 @@ module rodyn_sweep_merge
    type :: case_block
       integer :: n = 0
       real(wp), allocatable :: frequency(:, :), damping_ratio(:, :) !! (mode, case)
-      real(wp), allocatable :: final(:, :)      !! (state, case)
-      real(wp), allocatable :: probes(:, :, :)  !! (state, probe, case)
+      real(wp), allocatable :: final(:, :)      !! (value, case)
+      real(wp), allocatable :: probes(:, :, :)  !! (value, probe, case)
       real(wp), allocatable :: times(:, :)      !! (row, case)
-      real(wp), allocatable :: series(:, :, :)  !! (state, row, case)
+      real(wp), allocatable :: series(:, :, :)  !! (value, row, case)
       real(wp), allocatable :: t_reached(:), wall_seconds(:)
       integer(i8), allocatable :: n_steps(:), n_rhs(:), same_as(:), number(:)
       character(len=8), allocatable :: status(:)
@@ -110,7 +106,7 @@ contains
       type(case_shape), intent(in) :: shape
       integer, intent(in) :: n_cases
       integer :: numbers
-      numbers = 2*shape%n_modes + shape%n_states*(1 + shape%n_probes + shape%n_rows) + shape%n_rows + 1
+      numbers = 2*shape%n_modes + shape%layout%n_values*(1 + shape%n_probes + shape%n_rows) + shape%n_rows + 1
       n = max(1, min(n_cases, most_block_cases, block_bytes/(8*numbers)))
    end function cases_per_block
 
@@ -120,8 +116,8 @@ contains
       type(case_shape), intent(in) :: shape
       integer, intent(in) :: n, message_length
       allocate (block%frequency(shape%n_modes, n), block%damping_ratio(shape%n_modes, n))
-      allocate (block%final(shape%n_states, n), block%probes(shape%n_states, shape%n_probes, n))
-      allocate (block%times(shape%n_rows, n), block%series(shape%n_states, shape%n_rows, n))
+      allocate (block%final(shape%layout%n_values, n), block%probes(shape%layout%n_values, shape%n_probes, n))
+      allocate (block%times(shape%n_rows, n), block%series(shape%layout%n_values, shape%n_rows, n))
       allocate (block%t_reached(n), block%wall_seconds(n))
       allocate (block%n_steps(n), block%n_rhs(n), block%same_as(n), block%number(n))
       allocate (block%status(n))
@@ -213,12 +209,16 @@ contains
 
       compression = sweep%base_case%output%compression
 
-      if (shape%n_states > 0) then
+      if (shape%layout%n_values > 0) then
          call file%write('probe_time', sweep%probe_times, compression, error)
          call describe('probe_time', 's', 'time at which the state of each case is kept')
-         if (.not. allocated(error)) call file%write('rod', [(i, i=1, shape%n_rods)], compression, error)
-         call describe('rod', '1', 'rod, counted from the spacecraft')
       end if
+      do i = 1, size(chain_axes)
+         if (.not. shape%layout%counts(i)) cycle
+         if (.not. allocated(error)) call file%write(trim(chain_axes(i)%name), entries(chain_axes(i), shape%layout%n_rods), &
+                                                     compression, error)
+         call describe(trim(chain_axes(i)%name), '1', trim(chain_axes(i)%long_name))
+      end do
       if (shape%n_modes > 0) then
          if (.not. allocated(error)) call file%write('mode', [(i, i=1, shape%n_modes)], compression, error)
          call describe('mode', '1', 'oscillation, by rising natural frequency')
@@ -249,30 +249,21 @@ contains
          call make('frequency', [shape%n_modes], 'real', 'rad s-1', 'natural frequency '//state)
          call make('damping_ratio', [shape%n_modes], 'real', '1', 'damping ratio '//state)
       end if
-      if (shape%n_states == 0) return
-      do i = 1, shape%n_per_rod
-         call make_state(per_rod(i), [shape%n_rods])
-      end do
-      do i = 1, size(scalars)
-         call make_state(scalars(i), [integer ::])
+      do i = 1, size(shape%layout%quantities)
+         call make_quantity(shape%layout%quantities(i), shape%layout%row_shape(i))
       end do
       if (shape%n_rows > 0) call make('series_time', [shape%n_rows], 'real', 's', 'output times; NaN behind the last')
 
    contains
 
       !> At the probe times, at the end, and perhaps all along.
-      subroutine make_state(i, row)
-         integer, intent(in) :: i
-         integer, intent(in) :: row(:)
-         associate (variable => run_variables(i))
-            call make(trim(variable%name), [row, shape%n_probes], 'real', trim(variable%units), &
-                      trim(variable%long_name)//', at the probe times')
-            call make('final_'//trim(variable%name), row, 'real', trim(variable%units), &
-                      trim(variable%long_name)//', at the end of the case')
-            if (shape%n_rows > 0) call make('series_'//trim(variable%name), [row, shape%n_rows], 'real', &
-                                            trim(variable%units), trim(variable%long_name))
-         end associate
-      end subroutine make_state
+      subroutine make_quantity(x, row)
+         type(quantity), intent(in) :: x
+         integer, intent(in) :: row(:) !! its shape
+         call make(trim(x%name), [row, shape%n_probes], 'real', trim(x%units), trim(x%long_name)//', at the probe times')
+         call make('final_'//trim(x%name), row, 'real', trim(x%units), trim(x%long_name)//', at the end of the case')
+         if (shape%n_rows > 0) call make('series_'//trim(x%name), [row, shape%n_rows], 'real', trim(x%units), trim(x%long_name))
+      end subroutine make_quantity
 
       function parameter_name(a) result(name)
          integer, intent(in) :: a
@@ -315,11 +306,9 @@ contains
       type(case_block), intent(in) :: block
       type(case_shape), intent(in) :: shape
       type(error_type), allocatable, intent(out) :: error
-      character(len=:), allocatable :: name
-      real(wp), allocatable :: part_2(:, :), part_3(:, :, :) ! contiguous copies
-      integer :: i, first, last
+      integer :: i
 
-      associate (n => block%n, rods => shape%n_rods)
+      associate (n => block%n)
          call file%append('case', block%number(:n), error)
          if (.not. allocated(error)) call file%append('status', block%status(:n), error)
          if (.not. allocated(error)) call file%append('message', block%message(:n), error)
@@ -332,32 +321,43 @@ contains
             if (.not. allocated(error)) call file%append('frequency', block%frequency(:, :n), error)
             if (.not. allocated(error)) call file%append('damping_ratio', block%damping_ratio(:, :n), error)
          end if
-         if (shape%n_states == 0) return
-         do i = 1, shape%n_per_rod
-            first = (i - 1)*rods + 1
-            last = i*rods
-            name = trim(run_variables(per_rod(i))%name)
-            part_3 = block%probes(first:last, :, :n)
-            if (.not. allocated(error)) call file%append(name, part_3, error)
-            part_2 = block%final(first:last, :n)
-            if (.not. allocated(error)) call file%append('final_'//name, part_2, error)
-            if (shape%n_rows == 0) cycle
-            part_3 = block%series(first:last, :, :n)
-            if (.not. allocated(error)) call file%append('series_'//name, part_3, error)
-         end do
-         do i = 1, size(scalars)
-            first = shape%n_per_rod*rods + i
-            name = trim(run_variables(scalars(i))%name)
-            part_2 = block%probes(first, :, :n)
-            if (.not. allocated(error)) call file%append(name, part_2, error)
-            if (.not. allocated(error)) call file%append('final_'//name, [block%final(first, :n)], error)
-            if (shape%n_rows == 0) cycle
-            part_2 = block%series(first, :, :n)
-            if (.not. allocated(error)) call file%append('series_'//name, part_2, error)
+         do i = 1, size(shape%layout%quantities)
+            if (.not. allocated(error)) call append_quantity(file, block, shape, shape%layout%quantities(i), error)
          end do
          if (.not. allocated(error) .and. shape%n_rows > 0) call file%append('series_time', block%times(:, :n), error)
       end associate
    end subroutine append_block
+
+   !> One of the quantities that are kept of each case.
+   subroutine append_quantity(file, block, shape, x, error)
+      type(hdf5_file), intent(in) :: file
+      type(case_block), intent(in) :: block
+      type(case_shape), intent(in) :: shape
+      type(quantity), intent(in) :: x
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), allocatable :: part_2(:, :), part_3(:, :, :) ! contiguous copies
+      character(len=:), allocatable :: name
+
+      name = trim(x%name)
+      associate (n => block%n)
+         if (x%along > 0) then
+            part_3 = block%probes(x%first:x%last, :, :n)
+            call file%append(name, part_3, error)
+            part_2 = block%final(x%first:x%last, :n)
+            if (.not. allocated(error)) call file%append('final_'//name, part_2, error)
+            if (shape%n_rows == 0) return
+            part_3 = block%series(x%first:x%last, :, :n)
+            if (.not. allocated(error)) call file%append('series_'//name, part_3, error)
+         else
+            part_2 = block%probes(x%first, :, :n)
+            call file%append(name, part_2, error)
+            if (.not. allocated(error)) call file%append('final_'//name, [block%final(x%first, :n)], error)
+            if (shape%n_rows == 0) return
+            part_2 = block%series(x%first, :, :n)
+            if (.not. allocated(error)) call file%append('series_'//name, part_2, error)
+         end if
+      end associate
+   end subroutine append_quantity
 
    !> The values of the axes in cases first, first + 1, ...
    subroutine append_parameters(file, sweep, plan, first, n, error)
@@ -399,8 +399,10 @@ contains
       integer :: a, i
 
       call file%make_scale('case', error)
-      if (.not. allocated(error) .and. shape%n_states > 0) call file%make_scale('probe_time', error)
-      if (.not. allocated(error) .and. shape%n_states > 0) call file%make_scale('rod', error)
+      if (.not. allocated(error) .and. shape%layout%n_values > 0) call file%make_scale('probe_time', error)
+      do i = 1, size(chain_axes)
+         if (shape%layout%counts(i) .and. .not. allocated(error)) call file%make_scale(trim(chain_axes(i)%name), error)
+      end do
       if (.not. allocated(error) .and. shape%n_modes > 0) call file%make_scale('mode', error)
       if (.not. allocated(error) .and. shape%n_rows > 0) call file%make_scale('row', error)
       do i = 1, size(plain)
@@ -415,12 +417,8 @@ contains
          call attach('damping_ratio', 1, 'mode')
          call attach('damping_ratio', 2, 'case')
       end if
-      if (shape%n_states == 0) return
-      do i = 1, shape%n_per_rod
-         call attach_state(trim(run_variables(per_rod(i))%name), 1)
-      end do
-      do i = 1, size(scalars)
-         call attach_state(trim(run_variables(scalars(i))%name), 0)
+      do i = 1, size(shape%layout%quantities)
+         call attach_quantity(trim(shape%layout%quantities(i)%name), shape%layout%quantities(i)%along)
       end do
       if (shape%n_rows == 0) return
       call attach('series_time', 1, 'row')
@@ -428,21 +426,24 @@ contains
 
    contains
 
-      subroutine attach_state(name, before)
+      subroutine attach_quantity(name, along)
          character(len=*), intent(in) :: name
-         integer, intent(in) :: before !! 1: with a dimension of rods
-         if (before == 1) then
-            call attach(name, 1, 'rod')
-            call attach('final_'//name, 1, 'rod')
+         integer, intent(in) :: along !! 0, or one of `chain_axes`
+         integer :: before
+
+         before = min(along, 1)
+         if (along > 0) then
+            call attach(name, 1, trim(chain_axes(along)%name))
+            call attach('final_'//name, 1, trim(chain_axes(along)%name))
          end if
          call attach(name, before + 1, 'probe_time')
          call attach(name, before + 2, 'case')
          call attach('final_'//name, before + 1, 'case')
          if (shape%n_rows == 0) return
-         if (before == 1) call attach('series_'//name, 1, 'rod')
+         if (along > 0) call attach('series_'//name, 1, trim(chain_axes(along)%name))
          call attach('series_'//name, before + 1, 'row')
          call attach('series_'//name, before + 2, 'case')
-      end subroutine attach_state
+      end subroutine attach_quantity
 
       subroutine attach(name, dimension, scale)
          character(len=*), intent(in) :: name, scale

@@ -24,7 +24,7 @@ contains
       integer, intent(in) :: status, message_length
       record_words = shortest_record + (message_length + 7)/8
       if (status == status_done) record_words = record_words + 2*shape%n_modes + &
-                                                shape%n_states*(1 + shape%n_probes + shape%n_rows) + shape%n_rows
+                                                shape%layout%n_values*(1 + shape%n_probes + shape%n_rows) + shape%n_rows
    end function record_words
 
    !> Write a record into the first `n` words.
