@@ -4,8 +4,9 @@ module rodyn_lane_accelerations
    use rodyn_lanes, only: lanes
    use rodyn_lane_scene, only: lane_scene
    use rodyn_lane_hinges, only: lane_rigid_moments, lane_series_moments
-   use rodyn_lane_recursion_flexible, only: lane_flexible_recursion
-   use rodyn_lane_recursion_rigid, only: lane_rigid_recursion
+   use rodyn_lane_recursion_flexible, only: lane_flexible_accelerations
+   use rodyn_lane_recursion_rigid, only: lane_rigid_accelerations
+   use rodyn_outboard_chain, only: lane_outward_size
    use rodyn_trigonometry, only: sine_cosine
    implicit none (type, external)
    private
@@ -14,7 +15,7 @@ module rodyn_lane_accelerations
    !> Memory of the kernels.
    type :: lane_work
       real(wp), allocatable :: sine(:, :), cosine(:, :) !! of phi (lanes, 0:n); 0 and 1 at k = 0
-      real(wp), allocatable :: outward(:, :, :)         !! what the inward pass leaves for the outward pass (lanes, 8, n)
+      real(wp), allocatable :: outward(:, :, :)         !! between the passes (lanes, lane_outward_size, n)
       real(wp), allocatable :: theta(:, :), moment(:, :) !! joint rotations (lanes, 0:n-1), hinge moments (lanes, 0:n)
    end type lane_work
 
@@ -24,8 +25,8 @@ contains
       type(lane_work), intent(out) :: work
       type(lane_scene), intent(in) :: group
       associate (n => group%n)
-         allocate (work%sine(lanes, 0:n), work%cosine(lanes, 0:n), work%outward(lanes, 8, n), work%theta(lanes, 0:n - 1), &
-                   work%moment(lanes, 0:n), source=0.0_wp)
+         allocate (work%sine(lanes, 0:n), work%cosine(lanes, 0:n), work%outward(lanes, lane_outward_size, n), &
+                   work%theta(lanes, 0:n - 1), work%moment(lanes, 0:n), source=0.0_wp)
       end associate
       work%cosine(:, 0) = 1.0_wp
    end subroutine new_lane_work
@@ -41,11 +42,11 @@ contains
       associate (n => group%n, b => group%n_base)
          call sine_cosine(lanes*n, q(:, b + 1:b + n), work%sine(:, 1:), work%cosine(:, 1:))
          if (group%flexible) then
-            call lane_flexible_recursion(n, b, group%rods, group%rod_of, group%node_mass, group%stiffness, group%damping, &
-                                         group%kink_moment, group%mass, group%inertia, group%hinge_x, group%hinge_y, &
-                                         group%base_force, group%loaded, group%node_force, work%sine, work%cosine, &
-                                         q(:, b + 1:b + n), q(:, b + n + 1:b + 2*n), q(:, b + 2*n + 1:b + 3*n), p, &
-                                         work%outward, acceleration, ok)
+            call lane_flexible_accelerations(n, b, group%rods, group%rod_of, group%node_mass, group%stiffness, group%damping, &
+                                             group%kink_moment, group%mass, group%inertia, group%hinge_x, group%hinge_y, &
+                                             group%base_force, group%loaded, group%node_force, work%sine, work%cosine, &
+                                             q(:, b + 1:b + n), q(:, b + n + 1:b + 2*n), q(:, b + 2*n + 1:b + 3*n), p, &
+                                             work%outward, acceleration, ok)
             return
          end if
          if (group%series) then
@@ -55,9 +56,9 @@ contains
             call lane_rigid_moments(n, group%stiffness, group%damping, group%kink_moment, q(:, b + 1:b + n), &
                                     p(:, b + 1:b + n), work%moment)
          end if
-         call lane_rigid_recursion(n, b, group%rods, group%rod_of, group%node_mass, group%mass, group%inertia, group%hinge_x, &
-                                   group%hinge_y, group%base_force, group%loaded, group%node_force, work%sine, work%cosine, &
-                                   work%moment, p, work%outward, acceleration, ok)
+         call lane_rigid_accelerations(n, b, group%rods, group%rod_of, group%node_mass, group%mass, group%inertia, &
+                                       group%hinge_x, group%hinge_y, group%base_force, group%loaded, group%node_force, &
+                                       work%sine, work%cosine, work%moment, p, work%outward, acceleration, ok)
       end associate
    end subroutine group_accelerations
 

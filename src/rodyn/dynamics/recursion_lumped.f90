@@ -3,18 +3,20 @@
 !> A massless rod pulls and pushes only along itself, apart from the couple T_k - T_{k-1}: seen from its inner
 !> node, the chain from rod k outward is  f = a Ae e + b  with one axial apparent mass
 !>     a = mu (mu + a_out)/(mu + a_out sin^2(delta)),
-!> delta the angle from rod k to rod k + 1 and mu the mass between them: no differences, no loss of digits.
+!> delta the angle from rod k to rod k + 1 and mu the mass between them: no differences, no loss of digits. In vector lanes:
+!> `rodyn_lane_recursion_rigid`, which has the same limit.
 module rodyn_recursion_lumped
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp
-   use rodyn_outward, only: outward_size
+   use rodyn_outboard_chain, only: outboard_chain, outward_size
    use rodyn_rod_constants, only: rod_constants
-   use rodyn_spacecraft, only: spacecraft_body, spacecraft_accelerations
+   use rodyn_spacecraft, only: spacecraft_body
+   use rodyn_spacecraft_accelerations, only: spacecraft_accelerations
    implicit none (type, external)
    private
    public :: lumped_accelerations
 
-   ! Places in `outward` (`rodyn_outward`).
+   ! Places in `outward` (`rodyn_outboard_chain`).
    integer, parameter :: of_shear = 1, of_along = 3, of_pull = 5, of_cosine = 7, of_sine = 9
 
 contains
@@ -36,19 +38,42 @@ contains
       real(wp), intent(out) :: outward(outward_size, n) !! workspace
       real(wp), intent(out) :: acceleration(n_base + n) !! p'
       logical, intent(out) :: ok                    !! false: not finite
-
-      integer :: k
-      real(wp) :: omega, omega_rate, lw2, a, be, bn, mu, inv, shear, ratio, cd, sd, ae, an, outer_an, r, base_smallest
+      type(outboard_chain) :: chain
+      real(wp) :: omega, omega_rate, ae, an, base_smallest
 
       omega = 0.0_wp
       if (n_base > 0) omega = p(3)
+      call inward_pass(n, rods, rod_of, node_mass, sine, cosine, p(n_base + 1), omega, moment, loaded, node_force, outward, chain)
+      call spacecraft_accelerations(n_base, body, p, chain, base_force, acceleration, ae, an, base_smallest)
+      omega_rate = 0.0_wp
+      if (n_base > 0) omega_rate = acceleration(3)
+      call outward_pass(n, rods, rod_of, outward, omega_rate, ae, an, acceleration(n_base + 1))
+      ok = ieee_is_finite(an)
+   end subroutine lumped_accelerations
+
+   !> The chain as hinge 0 feels it, moving axes, and what the outward pass needs of each rod.
+   pure subroutine inward_pass(n, rods, rod_of, node_mass, sine, cosine, phi_rate, omega, moment, loaded, node_force, &
+                               outward, chain)
+      integer, intent(in) :: n
+      type(rod_constants), intent(in) :: rods(*)
+      integer, intent(in) :: rod_of(n)
+      real(wp), intent(in) :: node_mass(0:n), sine(0:n), cosine(0:n)
+      real(wp), intent(in) :: phi_rate(n)
+      real(wp), intent(in) :: omega                  !! w [rad/s]
+      real(wp), intent(in) :: moment(0:n)
+      logical, intent(in) :: loaded
+      real(wp), intent(in) :: node_force(2, *)
+      real(wp), intent(out) :: outward(outward_size, n)
+      type(outboard_chain), intent(out) :: chain
+      integer :: k
+      real(wp) :: lw2, a, be, bn, mu, inv, shear, ratio, cd, sd, r
+
       a = 0.0_wp
       be = 0.0_wp
       bn = 0.0_wp
       cd = 1.0_wp ! of the angle from rod k to rod k + 1
       sd = 0.0_wp
-
-      inward: do k = n, 1, -1
+      do k = n, 1, -1
          associate (length => rods(rod_of(k))%length)
             mu = node_mass(k)
             if (loaded) then
@@ -56,7 +81,7 @@ contains
                bn = bn - (node_force(2, k)*cosine(k) - node_force(1, k)*sine(k))
             end if
             ! P = mu I + a e'e', e' the axis of rod k + 1; its row across rod k is (pen, pnn).
-            lw2 = length*(omega + p(n_base + k))**2
+            lw2 = length*(omega + phi_rate(k))**2
             shear = (moment(k) - moment(k - 1))/length
             inv = 1.0_wp/(mu + a*sd**2)
             ratio = a*cd*sd*inv
@@ -75,24 +100,30 @@ contains
          r = cd*be - sd*bn
          bn = sd*be + cd*bn
          be = r
-      end do inward
+      end do
+      chain = outboard_chain(a*cd**2, a*cd*sd, a*sd**2, 0.0_wp, be, bn, node_mass(0), moment(0))
+   end subroutine inward_pass
 
-      call spacecraft_accelerations(n_base, body, p, node_mass(0), a*cd**2, a*cd*sd, a*sd**2, 0.0_wp, be, bn, &
-                                    moment(0), base_force, acceleration, ae, an, base_smallest)
-      omega_rate = 0.0_wp
-      if (n_base > 0) omega_rate = acceleration(3)
+   !> phi'' from the acceleration of hinge 0.
+   pure subroutine outward_pass(n, rods, rod_of, outward, omega_rate, ae, an, phi_acceleration)
+      integer, intent(in) :: n
+      type(rod_constants), intent(in) :: rods(*)
+      integer, intent(in) :: rod_of(n)
+      real(wp), intent(in) :: outward(outward_size, n)
+      real(wp), intent(in) :: omega_rate            !! w' [rad/s^2]
+      real(wp), intent(inout) :: ae, an             !! in: of hinge 0, moving axes; out: of the tip, axes of rod n [m/s^2]
+      real(wp), intent(out) :: phi_acceleration(n)
+      integer :: k
+      real(wp) :: along, across, outer
 
       do k = 1, n
-         cd = outward(of_cosine, k)
-         sd = outward(of_sine, k)
-         r = cd*ae + sd*an
-         an = cd*an - sd*ae
-         ae = r - outward(of_pull, k)
-         outer_an = outward(of_shear, k) - outward(of_along, k)*ae ! acceleration of node k across the rod
-         acceleration(n_base + k) = (outer_an - an)/rods(rod_of(k))%length - omega_rate
-         an = outer_an
+         along = outward(of_cosine, k)*ae + outward(of_sine, k)*an
+         across = outward(of_cosine, k)*an - outward(of_sine, k)*ae
+         ae = along - outward(of_pull, k)
+         outer = outward(of_shear, k) - outward(of_along, k)*ae ! acceleration of node k across the rod
+         phi_acceleration(k) = (outer - across)/rods(rod_of(k))%length - omega_rate
+         an = outer
       end do
-      ok = ieee_is_finite(an)
-   end subroutine lumped_accelerations
+   end subroutine outward_pass
 
 end module rodyn_recursion_lumped

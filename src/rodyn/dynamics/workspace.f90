@@ -1,7 +1,7 @@
 !> Memory of one running scene: all that the right-hand side writes besides its result. One per thread.
 module rodyn_workspace
    use rodyn_kinds, only: wp
-   use rodyn_outward, only: outward_size
+   use rodyn_outboard_chain, only: outward_size
    use rodyn_scene, only: scene_type
    implicit none (type, external)
    private
