@@ -512,8 +512,8 @@ contains
                       error)
       if (.not. allocated(error)) call new_scene(expected, given, error)
       if (allocated(error)) return
-      call check_close(error, [scene%node_mass, scene%hinges%stiffness, scene%hinges%damping, scene%loads%loads%rise], &
-                       [expected%node_mass, expected%hinges%stiffness, expected%hinges%damping, expected%loads%loads%rise], &
+      call check_close(error, [scene%node_mass, scene%hinges%stiffness, scene%hinges%damping, scene%loads%loads%law%span], &
+                       [expected%node_mass, expected%hinges%stiffness, expected%hinges%damping, expected%loads%loads%law%span], &
                        0.0_wp, 'scene')
       if (.not. allocated(error)) call check(error, resolved_case(resolved), resolved_case(given), 'values used')
       if (allocated(error)) return

@@ -5,7 +5,7 @@ module rodyn_case_check
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: case_config, hinge_config, kink_config, load_config, model_config, profile_config, name_length, &
       none_given
-   use rodyn_case_fields, only: visit_case, keys_of_law, keys_of_kink_law
+   use rodyn_case_fields, only: visit_case
    use rodyn_case_rules, only: check_case
    use rodyn_case_schema, only: case_extents, case_rows
    use rodyn_case_values, only: list_text, plain_text, value_shown
@@ -15,6 +15,7 @@ module rodyn_case_check
    use rodyn_key_judge, only: key_judge
    use rodyn_schema, only: any_list, matching_word, requirement, row_index, rule_text, satisfies, schema_extent, up_to, count_rule
    use rodyn_text, only: has_word, printable, quoted, to_text, word
+   use rodyn_time_law, only: keys_of_law
    implicit none (type, external)
    private
    public :: sound_case, complete_case
@@ -233,10 +234,10 @@ contains
          given = .not. is_none(program%t_end)
       case ('value')
          given = .not. is_unset(program%value)
-         if (.not. given) given = has_word(keys_of_kink_law(program%law), key)
+         if (.not. given) given = has_word(keys_of_law(program%law), key)
       case ('rate')
          given = .not. is_unset(program%rate)
-         if (.not. given) given = has_word(keys_of_kink_law(program%law), key)
+         if (.not. given) given = has_word(keys_of_law(program%law), key)
       case ('times')
          given = has_values(program%times)
       case ('values')

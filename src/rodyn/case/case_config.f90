@@ -7,6 +7,7 @@
 module rodyn_case_config
    use rodyn_kinds, only: wp
    use rodyn_methods, only: solver_options
+   use rodyn_time_law, only: law_config
    implicit none (type, external)
    private
    public :: case_config, spacecraft_config, chain_config, profile_config, model_config, initial_config, load_config, kink_config, &
@@ -78,32 +79,19 @@ module rodyn_case_config
       real(wp) :: rotation = 0.0_wp          !! theta [rad]
    end type initial_config
 
-   !> One &load group
-   type :: load_config
+   !> One &load group; values in [N] or [N m]
+   type, extends(law_config) :: load_config
       character(len=name_length) :: target = 'spacecraft' !! 'spacecraft' or 'node'
       integer :: node = 0                                 !! 1..n when target is 'node'
       character(len=name_length) :: component = 'M'       !! 'X', 'Y' [N] or 'M' [N m], moving axes
       character(len=name_length) :: law = 'constant'      !! 'constant', 'table', 'sine_squared', 'smooth_step'
-      real(wp) :: t_start = 0.0_wp                        !! [s]
-      real(wp) :: t_end = none_given                      !! [s]; none_given: t_end of the case
-      real(wp) :: value = 0.0_wp                          !! amplitude [N] or [N m]
-      real(wp) :: rate = 0.0_wp                           !! of sine_squared [rad/s]
-      real(wp) :: rise_time = 0.0_wp                      !! of smooth_step [s]; 0: t_end - t_start
-      real(wp), allocatable :: times(:)                   !! of table, increasing; two equal ones: a jump [s]
-      real(wp), allocatable :: values(:)                  !! of table [N] or [N m]
       character(len=name_length) :: after = 'zero'        !! of table, beyond its last time: 'zero' or 'hold'
    end type load_config
 
-   !> One &kink_program group
-   type :: kink_config
-      integer :: hinge = 0                      !! 0..n-1
+   !> One &kink_program group; values in [rad]. A step has t_end = t_start
+   type, extends(law_config) :: kink_config
+      integer :: hinge = 0                              !! 0..n-1
       character(len=name_length) :: law = 'smooth_step' !! 'ramp', 'smooth_step', 'sine' or 'table'
-      real(wp) :: t_start = 0.0_wp              !! [s]
-      real(wp) :: t_end = none_given            !! [s]; t_start: a step; none_given: t_end of the case
-      real(wp) :: value = 0.0_wp                !! change of the kink, or amplitude [rad]
-      real(wp) :: rate = 0.0_wp                 !! of sine [rad/s]
-      real(wp), allocatable :: times(:)         !! of table, increasing [s]
-      real(wp), allocatable :: values(:)        !! of table [rad]
    end type kink_config
 
    !> One &hinge group. All angles are joint rotations th, from the kink.

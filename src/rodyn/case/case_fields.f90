@@ -4,9 +4,10 @@ module rodyn_case_fields
       model_config, output_config, profile_config, solver_config, spacecraft_config
    use rodyn_field_visitor, only: field_visitor
    use rodyn_text, only: has_word
+   use rodyn_time_law, only: keys_of_law
    implicit none (type, external)
    private
-   public :: visit_case, keys_of_law, keys_of_kink_law
+   public :: visit_case
 
 contains
 
@@ -150,7 +151,7 @@ contains
       call visitor%open_group('kink_program', instance)
       call visitor%field('hinge', program%hinge)
       call visitor%word_field('law', program%law)
-      keys = keys_of_kink_law(program%law)
+      keys = keys_of_law(program%law)
       if (visitor%every_key .or. has_word(keys, 't_start')) call visitor%field('t_start', program%t_start)
       if (visitor%every_key .or. has_word(keys, 't_end')) call visitor%field('t_end', program%t_end)
       if (visitor%every_key .or. has_word(keys, 'value')) call visitor%field('value', program%value)
@@ -209,37 +210,5 @@ contains
       call visitor%field('compression', output%compression)
       call visitor%close_group()
    end subroutine visit_output
-
-   !> Those of the keys value, rate, rise_time, times, values and after that the law of a load takes.
-   pure function keys_of_law(law) result(keys)
-      character(len=*), intent(in) :: law
-      character(len=:), allocatable :: keys !! a list such as 'value|rate'
-      select case (law)
-      case ('constant')
-         keys = 'value'
-      case ('sine_squared')
-         keys = 'value|rate'
-      case ('smooth_step')
-         keys = 'value|rise_time'
-      case ('table')
-         keys = 'times|values|after'
-      case default
-         keys = ''
-      end select
-   end function keys_of_law
-
-   !> Those of the keys t_start, t_end, value, rate, times and values that a kink's law takes.
-   pure function keys_of_kink_law(law) result(keys)
-      character(len=*), intent(in) :: law
-      character(len=:), allocatable :: keys
-      select case (law)
-      case ('table')
-         keys = 'times|values'
-      case ('sine')
-         keys = 't_start|t_end|value|rate'
-      case default
-         keys = 't_start|t_end|value'
-      end select
-   end function keys_of_kink_law
 
 end module rodyn_case_fields

@@ -2,19 +2,15 @@
 module rodyn_case_rules
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: case_config, load_config, profile_config
-   use rodyn_case_fields, only: keys_of_law
    use rodyn_key_judge, only: key_judge, no_such
    use rodyn_hinge_rules, only: check_moving_hinges
-   use rodyn_law_rules, only: check_law_keys, check_table
    use rodyn_methods, only: list_of_methods, method_named, method_type, methods, order_rule
+   use rodyn_law_rules, only: check_law
    use rodyn_rod_profile, only: rod_profile, new_rod_profile, smallest_value
-   use rodyn_switch_times, only: same_time
    use rodyn_text, only: short_text, to_text
    implicit none (type, external)
    private
    public :: check_case
-
-   character(len=*), parameter :: law_keys(6) = [character(len=9) :: 'value', 'rate', 'rise_time', 'times', 'values', 'after']
 
 contains
 
@@ -35,12 +31,7 @@ contains
       end do
       do i = 1, size(config%loads)
          call check_target(judge, i, config%loads(i), config%chain%n_rods)
-         associate (law => config%loads(i)%law)
-            call check_law_keys(judge, 'load', i, law, law_keys, keys_of_law(law), 'rise_time|after')
-         end associate
-         call check_times(judge, i, config%loads(i))
-         if (config%loads(i)%law == 'table') call check_table(judge, 'load', i, config%loads(i)%times, &
-                                                                     config%loads(i)%values, .false.)
+         call check_law(judge, 'load', i, config%loads(i)%law, config%loads(i), of_motion=.false.)
       end do
       call check_moving_hinges(judge, config)
    end subroutine check_case
@@ -289,34 +280,5 @@ contains
       call judge%blame('load', i, 'component', &
          "must be 'X' or 'Y' when target = 'node'; moments act on the spacecraft only")
    end subroutine check_target
-
-   !> The load must not end before it begins, and a smooth step must fit in between.
-   subroutine check_times(judge, i, load)
-      class(key_judge), intent(inout) :: judge
-      integer, intent(in) :: i
-      type(load_config), intent(in) :: load
-      character(len=:), allocatable :: whose !! t_end this is
-
-      if (.not. (judge%is_sound('load', i, 't_start') .and. judge%is_sound('load', i, 't_end'))) return
-      if (.not. judge%is_given('load', i, 't_end') .and. .not. judge%is_sound('case', 1, 't_end')) return
-      whose = ' of the same load'
-      if (.not. judge%is_given('load', i, 't_end')) whose = ', with t_end of &case'
-      if (load%t_start > load%t_end .and. .not. same_time(load%t_start, load%t_end)) then
-         if (judge%is_given('load', i, 't_start')) then
-            call judge%blame('load', i, 't_start', 'must not be after t_end = '//short_text(load%t_end)//' [s] of the same load')
-         else
-            call judge%blame('load', i, 't_end', 'must not be before t_start = '//short_text(load%t_start)//' [s] of the same load')
-         end if
-      else if (load%law == 'smooth_step' .and. judge%is_sound('load', i, 'rise_time') .and. &
-               judge%is_sound('load', i, 'law')) then
-         if (load%t_start + load%rise_time > load%t_end .and. &
-             .not. same_time(load%t_start + load%rise_time, load%t_end)) then
-            call judge%blame('load', i, 'rise_time', 'must not exceed t_end - t_start = ' &
-               //short_text(load%t_end - load%t_start)//' [s]'//whose)
-         else if (.not. load%rise_time > 0.0_wp) then
-            call judge%blame('load', i, 'rise_time', 'must be positive, but t_end = t_start [s]')
-         end if
-      end if
-   end subroutine check_times
 
 end module rodyn_case_rules

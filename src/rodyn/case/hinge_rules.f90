@@ -2,16 +2,13 @@
 module rodyn_hinge_rules
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: case_config, hinge_config, kink_config, none_given
-   use rodyn_case_fields, only: keys_of_kink_law
    use rodyn_key_judge, only: key_judge, no_such
-   use rodyn_law_rules, only: check_law_keys, check_table
+   use rodyn_law_rules, only: check_law
    use rodyn_switch_times, only: same_time
-   use rodyn_text, only: short_text
+   use rodyn_time_law, only: moves_smoothly
    implicit none (type, external)
    private
    public :: check_moving_hinges
-
-   character(len=*), parameter :: law_keys(6) = [character(len=7) :: 't_start', 't_end', 'value', 'rate', 'times', 'values']
 
 contains
 
@@ -23,10 +20,7 @@ contains
 
       do i = 1, size(config%kink_programs)
          call check_exists(judge, 'kink_program', i, config%kink_programs(i)%hinge, config%chain%n_rods)
-         associate (law => config%kink_programs(i)%law)
-            call check_law_keys(judge, 'kink_program', i, law, law_keys, keys_of_kink_law(law), 't_start|t_end')
-         end associate
-         call check_program_times(judge, i, config%kink_programs(i))
+         call check_law(judge, 'kink_program', i, config%kink_programs(i)%law, config%kink_programs(i), of_motion=.true.)
          call check_jumps(judge, i, config%kink_programs(i), config)
       end do
       do i = 1, size(config%hinges)
@@ -48,26 +42,6 @@ contains
       if (.not. judge%is_sound(group, i, 'hinge')) return
       call judge%blame(group, i, 'hinge', no_such('hinge', 0, n_rods - 1))
    end subroutine check_exists
-
-   !> A program must not end before it begins; only a ramp may be a step. Tables have values at times that increase.
-   subroutine check_program_times(judge, i, program)
-      class(key_judge), intent(inout) :: judge
-      integer, intent(in) :: i
-      type(kink_config), intent(in) :: program
-
-      if (program%law == 'table') then
-         call check_table(judge, 'kink_program', i, program%times, program%values, .true.)
-         return
-      end if
-      if (.not. (judge%is_sound('kink_program', i, 't_start') .and. judge%is_sound('kink_program', i, 't_end'))) return
-      if (.not. judge%is_given('kink_program', i, 't_end') .and. .not. judge%is_sound('case', 1, 't_end')) return
-      if (program%t_start > program%t_end .and. .not. same_time(program%t_start, program%t_end)) then
-         call judge%blame('kink_program', i, 't_start', 'must not be after t_end = '//short_text(program%t_end)// &
-                          ' [s] of the same program')
-      else if (same_time(program%t_start, program%t_end) .and. program%law /= 'ramp') then
-         call judge%blame('kink_program', i, 't_start', "must be before t_end; only law = 'ramp' may be a step")
-      end if
-   end subroutine check_program_times
 
    !> A kink that jumps would strike a damper or a lock with infinite force; so would one whose rate jumps a lock.
    subroutine check_jumps(judge, i, program, config)
@@ -91,7 +65,7 @@ contains
             if (step .and. max(hinge%stop_damping, hinge%lock_damping) > 0.0_wp) call judge%blame('kink_program', i, 'hinge', &
                'a step of the kink needs a hinge without stop_damping and lock_damping')
             if (hinge%lock_stiffness > 0.0_wp .or. .not. (hinge%held .or. hinge%latch_angle < none_given)) cycle
-            if (program%law == 'ramp' .or. program%law == 'sine') call judge%blame('kink_program', i, 'law', &
+            if (.not. moves_smoothly(program%law)) call judge%blame('kink_program', i, 'law', &
                "must be 'smooth_step' or 'table' at a hinge that is held or latches: its rate must not jump")
          end associate
       end do

@@ -4,28 +4,48 @@ module rodyn_law_rules
    use rodyn_key_judge, only: key_judge
    use rodyn_switch_times, only: same_time
    use rodyn_text, only: has_word, short_text, to_text
+   use rodyn_time_law, only: law_config, keys_of_law
    implicit none (type, external)
    private
-   public :: check_law_keys, check_table
+   public :: check_law
+
+   character(len=*), parameter :: need_not_be_given = 't_start|t_end|rise_time|after'
 
 contains
 
-   !> Each law has its own keys and takes no others.
-   subroutine check_law_keys(judge, group, i, law, keys, takes, defaults)
+   !> Note everything that is wrong with the law of a group.
+   subroutine check_law(judge, group, i, law, given, of_motion)
       class(key_judge), intent(inout) :: judge
       character(len=*), intent(in) :: group
       integer, intent(in) :: i !! which of these groups
       character(len=*), intent(in) :: law
-      character(len=*), intent(in) :: keys(:)
-      character(len=*), intent(in) :: takes    !! keys that the law takes, a list such as 'value|rate'
-      character(len=*), intent(in) :: defaults !! those of them that need not be given
+      class(law_config), intent(in) :: given
+      logical, intent(in) :: of_motion !! it is smooth but for a step; a force may jump
+
+      if (of_motion) then
+         call check_keys(judge, group, i, law, [character(len=9) :: 't_start', 't_end', 'value', 'rate', 'times', 'values'])
+         if (law /= 'table') call check_motion_times(judge, group, i, law, given)
+      else
+         call check_keys(judge, group, i, law, [character(len=9) :: 'value', 'rate', 'rise_time', 'times', 'values', 'after'])
+         call check_force_times(judge, group, i, law, given)
+      end if
+      if (law == 'table') call check_table(judge, group, i, given%times, given%values, of_motion)
+   end subroutine check_law
+
+   !> Each law has its own keys and takes no others.
+   subroutine check_keys(judge, group, i, law, keys)
+      class(key_judge), intent(inout) :: judge
+      character(len=*), intent(in) :: group
+      integer, intent(in) :: i
+      character(len=*), intent(in) :: law
+      character(len=*), intent(in) :: keys(:) !! of the group, which some laws do not take
       logical :: taken
       integer :: k
 
       if (.not. judge%is_sound(group, i, 'law')) return
       do k = 1, size(keys)
-         taken = has_word(takes, keys(k))
-         if (taken .and. has_word(defaults, keys(k))) cycle
+         taken = has_word(keys_of_law(law), keys(k))
+         if (taken .and. has_word(need_not_be_given, keys(k))) cycle
          if (judge%is_given(group, i, trim(keys(k))) .eqv. taken) cycle
          if (taken) then
             call judge%require(group, i, trim(keys(k)), "when law = '"//trim(law)//"'")
@@ -33,7 +53,55 @@ contains
             call judge%blame(group, i, trim(keys(k)), "does not go with law = '"//trim(law)//"'")
          end if
       end do
-   end subroutine check_law_keys
+   end subroutine check_keys
+
+   !> The load must not end before it begins, and a smooth step must fit in between.
+   subroutine check_force_times(judge, group, i, law, load)
+      class(key_judge), intent(inout) :: judge
+      character(len=*), intent(in) :: group
+      integer, intent(in) :: i
+      character(len=*), intent(in) :: law
+      class(law_config), intent(in) :: load
+      character(len=:), allocatable :: whose !! t_end this is
+
+      if (.not. (judge%is_sound(group, i, 't_start') .and. judge%is_sound(group, i, 't_end'))) return
+      if (.not. judge%is_given(group, i, 't_end') .and. .not. judge%is_sound('case', 1, 't_end')) return
+      whose = ' of the same load'
+      if (.not. judge%is_given(group, i, 't_end')) whose = ', with t_end of &case'
+      if (load%t_start > load%t_end .and. .not. same_time(load%t_start, load%t_end)) then
+         if (judge%is_given(group, i, 't_start')) then
+            call judge%blame(group, i, 't_start', 'must not be after t_end = '//short_text(load%t_end)//' [s] of the same load')
+         else
+            call judge%blame(group, i, 't_end', 'must not be before t_start = '//short_text(load%t_start)//' [s] of the same load')
+         end if
+      else if (law == 'smooth_step' .and. judge%is_sound(group, i, 'rise_time') .and. &
+               judge%is_sound(group, i, 'law')) then
+         if (load%t_start + load%rise_time > load%t_end .and. &
+             .not. same_time(load%t_start + load%rise_time, load%t_end)) then
+            call judge%blame(group, i, 'rise_time', 'must not exceed t_end - t_start = ' &
+               //short_text(load%t_end - load%t_start)//' [s]'//whose)
+         else if (.not. load%rise_time > 0.0_wp) then
+            call judge%blame(group, i, 'rise_time', 'must be positive, but t_end = t_start [s]')
+         end if
+      end if
+   end subroutine check_force_times
+
+   !> A motion must not end before it begins; only a ramp may be a step.
+   subroutine check_motion_times(judge, group, i, law, given)
+      class(key_judge), intent(inout) :: judge
+      character(len=*), intent(in) :: group
+      integer, intent(in) :: i
+      character(len=*), intent(in) :: law
+      class(law_config), intent(in) :: given
+
+      if (.not. (judge%is_sound(group, i, 't_start') .and. judge%is_sound(group, i, 't_end'))) return
+      if (.not. judge%is_given(group, i, 't_end') .and. .not. judge%is_sound('case', 1, 't_end')) return
+      if (given%t_start > given%t_end .and. .not. same_time(given%t_start, given%t_end)) then
+         call judge%blame(group, i, 't_start', 'must not be after t_end = '//short_text(given%t_end)//' [s] of the same program')
+      else if (same_time(given%t_start, given%t_end) .and. law /= 'ramp') then
+         call judge%blame(group, i, 't_start', "must be before t_end; only law = 'ramp' may be a step")
+      end if
+   end subroutine check_motion_times
 
    !> As many values as times, two at least, and times that increase: of a spline by more than rounding; of a load two may be
    !> equal, where it jumps, but not three.

@@ -5,7 +5,7 @@ module rodyn_case_notes
    use rodyn_case_config, only: case_config, hinge_config, none_given
    use rodyn_kink_program, only: kink_set, new_kink_set
    use rodyn_methods, only: method_named, method_type
-   use rodyn_loads, only: is_zero, load_set, new_load_set
+   use rodyn_loads, only: load_set, new_load_set
    use rodyn_switch_times, only: same_time
    use rodyn_text, only: formatted, tidy, to_text
    implicit none (type, external)
@@ -85,20 +85,20 @@ contains
       call new_kink_set(kinks, [real(wp) ::], config%kink_programs)
       do i = 1, size(loads%loads)
          associate (load => loads%loads(i))
-            why = idle_span(load%t_start, load%t_end, config%t_end)
-            if (len(why) == 0 .and. is_zero(load, config%t_end)) &
+            why = idle_span(load%law%t_start, load%law%t_end, config%t_end)
+            if (len(why) == 0 .and. load%law%is_zero(config%t_end)) &
                why = zero_of(config%loads(i)%law, config%loads(i)%value, 'its values are 0 as long as it acts')
             if (config%spacecraft%motion == 'fixed' .and. load%node == 0) why = 'the spacecraft is fixed'
          end associate
          if (len(why) > 0) call add(text, '&load, number '//to_text(i)//', never acts: '//why)
       end do
       do i = 1, size(kinks%programs)
-         associate (program => kinks%programs(i))
+         associate (law => kinks%programs(i)%law)
             why = ''
-            if (program%t_start < program%t_end .or. program%t_start >= config%t_end) & ! but for a step
-               why = idle_span(program%t_start, program%t_end, config%t_end)
-            if (len(why) == 0 .and. program%still) &
-               why = zero_of(config%kink_programs(i)%law, program%value, 'all its values are equal')
+            if (law%t_start < law%t_end .or. law%t_start >= config%t_end) & ! but for a step
+               why = idle_span(law%t_start, law%t_end, config%t_end)
+            if (len(why) == 0 .and. law%is_still()) &
+               why = zero_of(config%kink_programs(i)%law, law%value, 'all its values are equal')
          end associate
          if (len(why) > 0) call add(text, '&kink_program, number '//to_text(i)//', moves nothing: '//why)
       end do

@@ -57,8 +57,8 @@ contains
             end if
             call note(.true., count_text(size(loads), 'load'))
             call note(any(loads%node > 0), 'loads on nodes')
-            if (any(same_time(scene%switches, maxval(loads%t_end)))) &
-               call note(.false., 'loads after t = '//time_text(maxval(loads%t_end))//' s')
+            if (any(same_time(scene%switches, maxval(loads%law%t_end)))) &
+               call note(.false., 'loads after t = '//time_text(maxval(loads%law%t_end))//' s')
          end associate
       end subroutine note_loads
 

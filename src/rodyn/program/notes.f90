@@ -29,10 +29,10 @@ contains
       if (ledger .and. scene%dynamic_bending .and. .not. scene%consistent) &
          text = "formulation 'paper' has no exact energy: the energy residual includes the formulation's own"
       do i = 1, size(scene%loads%loads)
-         associate (load => scene%loads%loads(i))
-            if (.not. load%drops() .or. .not. any(same_time(scene%switches, load%t_end))) cycle
+         associate (law => scene%loads%loads(i)%law)
+            if (.not. law%drops() .or. .not. any(same_time(scene%switches, law%t_end))) cycle
             if (len(text) > 0) text = text//new_line('a')
-            text = text//'load '//to_text(i)//': its table ends at t = '//time_text(load%t_end)//' s, from then on it is zero; '// &
+            text = text//'load '//to_text(i)//': its table ends at t = '//time_text(law%t_end)//' s, from then on it is zero; '// &
                    "after = 'hold' holds its last value"
          end associate
       end do

@@ -16,9 +16,10 @@ module rodyn_scene
    use rodyn_rod_profile, only: rod_profile, new_rod_profile
    use rodyn_spacecraft, only: spacecraft_body
    use rodyn_hinge_law, only: hinge_law, new_hinge_law
-   use rodyn_loads, only: load_set, new_load_set, load_times
-   use rodyn_kink_program, only: kink_set, new_kink_set, kink_times
+   use rodyn_loads, only: load_set, new_load_set
+   use rodyn_kink_program, only: kink_set, new_kink_set
    use rodyn_sorting, only: sorted_order
+   use rodyn_time_law, only: law_times
    use rodyn_switch_times, only: add_switches, same_time, united_time
    implicit none (type, external)
    private
@@ -145,7 +146,7 @@ contains
       integer :: i
 
       associate (mechanisms => scene%hinges%mechanisms)
-         times = [load_times(scene%loads), kink_times(scene%kinks), mechanisms%release_time]
+         times = [law_times(scene%loads%loads%law), law_times(scene%kinks%programs%law), mechanisms%release_time]
          allocate (scene%switches(0))
          call add_switches(scene%switches, pack(times, times > 0.0_wp .and. times < t_end .and. .not. same_time(times, t_end)))
          do i = 1, size(mechanisms)
