@@ -4,8 +4,8 @@ module test_driver
    use rodyn_errors, only: error_type, raise
    use rodyn_case_config, only: case_config
    use rodyn_case_reader, only: parse_case
-   use rodyn_scene, only: scene_type, new_scene
-   use rodyn_motion, only: motion_type, new_motion, initial_state
+   use rodyn_motion, only: motion_type
+   use rodyn_run_setup, only: run_setup, new_run_setup
    use rodyn_integrator, only: integrator_type, solver_statistics
    use rodyn_driver, only: driver_type, new_driver
    use rodyn_method_trial, only: effort_of
@@ -37,11 +37,9 @@ module test_driver
    !> One case on its way.
    type :: run_type
       type(case_config) :: config
-      type(scene_type) :: scene
-      type(motion_type), pointer :: motion => null()
+      type(run_setup), pointer :: setup => null()
       type(driver_type) :: driver
       type(keeper) :: kept
-      real(wp), allocatable :: y(:)
       real(wp) :: t = 0.0_wp
    end type run_type
 
@@ -102,7 +100,7 @@ contains
       if (allocated(error)) return
       call check(error, run%driver%choice%method == 'gauss', 'auto takes '//run%driver%choice%method)
       if (allocated(error)) return
-      call make_quit(run%driver, run%motion, 2, 0.33_wp)
+      call make_quit(run%driver, run%setup%motion, 2, 0.33_wp)
       call perform(run, error)
       if (allocated(error)) return
       call check(error, maxval(abs(run%kept%states - reference%kept%states)) < 1.0e-5_wp, 'states are off')
@@ -129,7 +127,7 @@ contains
 
       call prepare(run, slewed//"&solver method = 'gauss' /", error)
       if (allocated(error)) return
-      call make_quit(run%driver, run%motion, 1, 0.33_wp)
+      call make_quit(run%driver, run%setup%motion, 1, 0.33_wp)
       call perform(run, failure)
       call check(error, allocated(failure), 'the run does not end')
       if (allocated(error)) return
@@ -145,7 +143,7 @@ contains
       call prepare(run, slewed, error)
       if (allocated(error)) return
       do i = 1, size(run%driver%members)
-         call make_quit(run%driver, run%motion, i, 0.33_wp)
+         call make_quit(run%driver, run%setup%motion, i, 0.33_wp)
       end do
       call perform(run, failure)
       call check(error, allocated(failure), 'the run does not end')
@@ -162,7 +160,7 @@ contains
 
       call prepare(run, slewed//'&solver max_steps = 300 /', error)
       if (allocated(error)) return
-      call make_quit(run%driver, run%motion, 2, 0.33_wp)
+      call make_quit(run%driver, run%setup%motion, 2, 0.33_wp)
       call perform(run, failure)
       call check(error, allocated(failure), 'the run does not end')
       if (allocated(error)) return
@@ -198,7 +196,7 @@ contains
       call prepare(run, rattling, error)
       if (.not. allocated(error)) call perform(run, error)
       if (allocated(error)) return
-      call check(error, run%motion%events%n_logged > 200, 'too few events')
+      call check(error, run%setup%motion%events%n_logged > 200, 'too few events')
       if (.not. allocated(error)) call check(error, run%driver%n_choices <= 6, 'choices in numbers')
    end subroutine test_many_events
 
@@ -226,7 +224,7 @@ contains
       call perform(run, error)
       if (allocated(error)) return
       stats = run%driver%members(2)%integrator%statistics()
-      call check(error, run%motion%events%n_logged == 2 .and. stats%n_starts == 1 .and. &
+      call check(error, run%setup%motion%events%n_logged == 2 .and. stats%n_starts == 1 .and. &
                  index(run%driver%reason(), ' s gauss: ') == 0, run%driver%reason())
    end subroutine test_left_for_good
 
@@ -238,7 +236,7 @@ contains
       call prepare(run, in_sequence, error)
       if (.not. allocated(error)) call perform(run, error)
       if (allocated(error)) return
-      effort = effort_of('dop853', run%scene, run%driver%statistics())
+      effort = effort_of('dop853', run%setup%motion%dynamics%scene, run%driver%statistics())
       call check(error, run%driver%n_choices > 1 .and. run%driver%tried < 0.5_wp*effort, 'trials cost too much')
    end subroutine test_trials_after_releases
 
@@ -252,7 +250,7 @@ contains
       effort = 0.0_wp
       call prepare(run, text//"&solver method = '"//method//"' /", error)
       if (.not. allocated(error)) call perform(run, error)
-      if (.not. allocated(error)) effort = effort_of('gauss', run%scene, run%driver%statistics())
+      if (.not. allocated(error)) effort = effort_of('gauss', run%setup%motion%dynamics%scene, run%driver%statistics())
    end subroutine measure
 
    !> Ready to begin.
@@ -262,21 +260,21 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       call parse_case(text, 'c.nml', run%config, error)
-      if (.not. allocated(error)) call new_scene(run%scene, run%config, error)
       if (allocated(error)) return
-      allocate (run%motion)
-      call new_motion(run%motion, run%scene, .true., error)
+      allocate (run%setup)
+      call new_run_setup(run%setup, run%config, .true., error)
       if (allocated(error)) return
-      call initial_state(run%motion, run%config%initial, run%y)
-      call new_driver(run%driver, run%motion, run%y, run%config%solver, run%config%t_end, 10, error)
-      allocate (run%kept%states(size(run%y), 11), source=0.0_wp)
+      call new_driver(run%driver, run%setup%motion, run%setup%y, run%config%solver, run%config%t_end, 10, error)
+      allocate (run%kept%states(size(run%setup%y), 11), source=0.0_wp)
    end subroutine prepare
 
    !> From the start to the end, with 10 intervals between outputs.
    subroutine perform(run, error)
       type(run_type), intent(inout) :: run
       type(error_type), allocatable, intent(out) :: error
-      call simulate(run%motion, run%driver, even_times(run%config%t_end, 10), run%config%t_end, run%kept, run%y, run%t, error)
+      associate (setup => run%setup)
+         call simulate(setup%motion, run%driver, even_times(setup%t_end, 10), setup%t_end, run%kept, setup%y, run%t, error)
+      end associate
    end subroutine perform
 
    !> Let a member work as it does, and give up.

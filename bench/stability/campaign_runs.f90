@@ -3,8 +3,8 @@ module rodyn_bench_campaign_runs
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type, exit_stopped
    use rodyn_case_config, only: case_config
-   use rodyn_scene, only: scene_type, new_scene
-   use rodyn_motion, only: motion_type, new_motion, initial_state, state_invariants
+   use rodyn_motion, only: motion_type, state_invariants
+   use rodyn_run_setup, only: run_setup, new_run_setup
    use rodyn_kinematics, only: invariants_type
    use rodyn_integrator, only: monitor_type
    use rodyn_driver, only: driver_type, new_driver
@@ -94,8 +94,7 @@ contains
       real(wp), intent(in) :: times(:) !! increasing from 0; the last is the end [s]
       real(wp), intent(in) :: budget   !! [s]
       type(run_result), intent(out) :: result
-      type(scene_type) :: scene
-      type(motion_type), target :: motion
+      type(run_setup), target :: setup
       type(driver_type) :: driver
       type(invariant_recorder) :: recorder
       type(budget_monitor), target :: monitor
@@ -105,14 +104,9 @@ contains
       call cpu_time(start)
       result%status = 'refused'
       result%message = ''
-      call new_scene(scene, config, error)
-      if (.not. allocated(error)) call new_motion(motion, scene, .true., error)
-      if (allocated(error)) then
-         result%message = error%message
-         return
-      end if
-      call initial_state(motion, config%initial, result%y)
-      call new_driver(driver, motion, result%y, config%solver, times(size(times)), size(times), error)
+      call new_run_setup(setup, config, .true., error)
+      if (.not. allocated(error)) call new_driver(driver, setup%motion, setup%y, config%solver, times(size(times)), size(times), &
+                                                  error)
       if (.not. allocated(error)) call driver%make(error)
       if (.not. allocated(error)) result%method = driver%choice%method
       if (allocated(error)) then
@@ -124,7 +118,8 @@ contains
       monitor%deadline = finish + budget
       call driver%set_monitor(monitor)
       allocate (recorder%errors(size(times)), source=0.0_wp)
-      call simulate(motion, driver, listed_times(times), times(size(times)), recorder, result%y, result%t, error)
+      call simulate(setup%motion, driver, listed_times(times), times(size(times)), recorder, setup%y, result%t, error)
+      result%y = setup%y
       call cpu_time(finish)
       result%seconds = finish - start
       result%n_steps = driver%n_steps
@@ -137,15 +132,15 @@ contains
          result%status = 'WRONG'
          result%message = 'done, but not finite'
       end if
-      total = sum(scene%node_mass) + sum(config%chain%length*config%chain%mass_per_length)
-      if (scene%n_base > 0) total = total + config%spacecraft%mass
+      total = sum(setup%motion%dynamics%scene%node_mass) + sum(config%chain%length*config%chain%mass_per_length)
+      if (setup%motion%dynamics%scene%n_base > 0) total = total + config%spacecraft%mass
       extent = sum(config%chain%length)
       associate (scale => max(recorder%scale, tiny(1.0_wp)))
          result%energy_error = recorder%worst(1)/scale
          result%momentum_error = recorder%worst(2)/sqrt(2.0_wp*scale*total)
          result%angular_error = recorder%worst(3)/(sqrt(2.0_wp*scale*total)*extent)
-         if (scene%n_base == 0) result%momentum_error = 0.0_wp
-         if (scene%n_base == 0) result%angular_error = 0.0_wp
+         if (setup%motion%dynamics%scene%n_base == 0) result%momentum_error = 0.0_wp
+         if (setup%motion%dynamics%scene%n_base == 0) result%angular_error = 0.0_wp
          result%times = times(:recorder%n_seen)
          result%errors = recorder%errors(:recorder%n_seen)/max(abs(recorder%first_energy), tiny(1.0_wp))
       end associate

@@ -204,7 +204,7 @@ contains
       else ! numbers may be finite, and what follows from them not
          call parse_case(input%text, input%name, config, error)
          if (.not. allocated(error)) call new_scene(scene, config, error)
-         if (.not. allocated(error)) call check_steps(config, scene, input%name, error)
+         if (.not. allocated(error)) call check_steps(config, input%name, error)
       end if
       if (allocated(error) .or. options%quiet) return
       name = name//': valid'

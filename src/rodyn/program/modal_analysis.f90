@@ -11,11 +11,10 @@ module rodyn_modal_analysis
    use rodyn_modes, only: mode_set, rigid_body, mechanism, relaxation
    use rodyn_modes_at_start, only: modes_at_start
    use rodyn_modes_file, only: write_modes
-   use rodyn_motion, only: motion_type, new_motion
    use rodyn_notes, only: notes_on
    use rodyn_result_file, only: check_output_path, provenance
    use rodyn_run_needs, only: check_memory, memory_of_scene, of_program
-   use rodyn_scene, only: scene_type, new_scene
+   use rodyn_run_setup, only: run_setup, new_run_setup
    use rodyn_terminal, only: print_line
    use rodyn_text, only: formatted, to_text
    implicit none (type, external)
@@ -38,8 +37,7 @@ contains
       logical, intent(in), optional :: force               !! replace an existing file
       logical, intent(in), optional :: quiet               !! print nothing
       type(case_config) :: config !! with what is not given
-      type(scene_type) :: scene
-      type(motion_type) :: motion
+      type(run_setup) :: setup
       type(linear_model) :: model
       type(mode_set) :: modes
       type(provenance) :: origin
@@ -53,17 +51,18 @@ contains
       if (.not. allocated(error)) call sound_case(given, config, error)
       if (.not. allocated(error)) call check_memory('n_rods = '//to_text(config%chain%n_rods), &
                                                     of_program + memory_of_scene(config), error)
-      if (.not. allocated(error)) call new_scene(scene, config, error)
-      if (.not. allocated(error)) call new_motion(motion, scene, .false., error)
-      if (.not. allocated(error)) call modes_at_start(motion, config, equilibrium, loads, .true., model, modes, error)
+      if (.not. allocated(error)) call new_run_setup(setup, config, .false., error)
+      if (.not. allocated(error)) call modes_at_start(setup%motion, config, equilibrium, loads, .true., model, modes, error)
       if (allocated(error)) return
       origin%title = ''
       if (allocated(config%title)) origin%title = config%title
       origin%resolved_input = resolved_case(config)
-      origin%notes = joined_lines(case_notes(config, .false.), notes_on(motion%dynamics%scene, model%q(:scene%n_dof), .false.))
       origin%sundials_version = sundials_version()
       if (present(input_text)) origin%input = input_text
-      call write_modes(path, replace, origin, motion%dynamics%scene, model, modes, equilibrium, error)
+      associate (scene => setup%motion%dynamics%scene)
+         origin%notes = joined_lines(case_notes(config, .false.), notes_on(scene, model%q(:scene%n_dof), .false.))
+         call write_modes(path, replace, origin, scene, model, modes, equilibrium, error)
+      end associate
       if (allocated(error) .or. silent) return
       call print_table(modes)
       if (.not. equilibrium .and. .not. model%is_steady(modes%fastest)) call print_line(&

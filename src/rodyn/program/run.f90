@@ -8,8 +8,7 @@ module rodyn_run
    use rodyn_case_check, only: sound_case
    use rodyn_case_notes, only: case_notes, joined_lines
    use rodyn_case_reader, only: resolved_case
-   use rodyn_scene, only: scene_type, new_scene
-   use rodyn_motion, only: motion_type, new_motion, initial_state, state_invariants
+   use rodyn_motion, only: motion_type, state_invariants
    use rodyn_kinematics, only: invariants_type
    use rodyn_integrator, only: solver_statistics
    use rodyn_integrators, only: sundials_version
@@ -18,6 +17,7 @@ module rodyn_run
    use rodyn_simulation, only: observer_type, even_times, simulate
    use rodyn_quantities, only: row_type, fill_row, is_finite, layout_of, new_row
    use rodyn_run_needs, only: check_needs
+   use rodyn_run_setup, only: run_setup, new_run_setup
    use rodyn_run_file, only: run_file, run_header, solver_report, check_output_path
    use rodyn_progress, only: progress_monitor, new_progress
    use rodyn_description, only: describe_scene
@@ -60,18 +60,15 @@ contains
       class(user_load), target, intent(inout), optional :: load !! forces of the caller's, beside those of the case
       character(len=*), intent(in), optional :: name       !! of the case, for what is refused of its keys
       type(case_config) :: config !! with what is not given
-      type(scene_type) :: scene
-      type(motion_type), target :: motion
+      type(run_setup), target :: setup
       type(recorder_type) :: recorder
       type(driver_type) :: driver
-      type(run_header) :: header
       type(progress_monitor), target :: progress
-      real(wp), allocatable :: y(:)
       type(error_type), allocatable :: failure
-      character(len=:), allocatable :: written
+      character(len=:), allocatable :: notes
       logical :: silent, replace, earlier
       integer(i8) :: clock_start, clock_end, clock_rate
-      real(wp) :: t
+      real(wp) :: t, seconds
 
       silent = .false.
       replace = .false.
@@ -83,83 +80,78 @@ contains
       call check_output_path(path, replace, error)
       if (.not. allocated(error)) call sound_case(given, config, error)
       if (.not. allocated(error)) call check_needs(config, path, error)
-      if (.not. allocated(error)) call new_scene(scene, config, error)
-      if (.not. allocated(error)) call new_motion(motion, scene, config%output%ledger, error)
+      if (.not. allocated(error)) call new_run_setup(setup, config, config%output%ledger, error, load)
       if (allocated(error)) return
-      if (present(load)) call motion%set_user_load(load)
-      motion%events%most = config%solver%max_events
-      call initial_state(motion, config%initial, y)
       progress = new_progress(0.0_wp, config%t_end, silent)
-      call new_driver(driver, motion, y, config%solver, config%t_end, config%n_outputs, error, progress)
+      call new_driver(driver, setup%motion, setup%y, config%solver, config%t_end, config%n_outputs, error, progress)
       if (allocated(error) .and. present(name)) error%message = name//': '//error%message
       if (allocated(error)) return
-      header%notes = joined_lines(case_notes(config, .true.), notes_on(scene, y(:scene%n_dof), config%output%ledger))
-      if (.not. silent) then
-         call print_line(describe_scene(scene, config%output%ledger))
-         call print_line('method  '//driver%methods()//': '//driver%reason())
-         call print_lines('note   ', header%notes)
-      end if
+      associate (scene => setup%motion%dynamics%scene)
+         notes = joined_lines(case_notes(config, .true.), notes_on(scene, setup%y(:scene%n_dof), config%output%ledger))
+         if (.not. silent) call print_line(describe_scene(scene, config%output%ledger))
+      end associate
+      if (.not. silent) call print_line('method  '//driver%methods()//': '//driver%reason())
+      if (.not. silent) call print_lines('note   ', notes)
       call driver%make(error)
+      if (.not. allocated(error)) call begin_file(recorder, setup%motion, config, path, replace, notes, error, input_text)
       if (allocated(error)) return
+      call simulate(setup%motion, driver, even_times(config%t_end, config%n_outputs), config%t_end, recorder, setup%y, t, failure)
+      call progress%finish()
+      call system_clock(clock_end)
+      seconds = real(clock_end - clock_start, wp)/real(clock_rate, wp)
+      call end_file(recorder, driver, setup%motion, config, path, .not. present(load), seconds, failure, earlier, error)
+      if (.not. silent .and. .not. allocated(error)) call print_result(driver, recorder, setup%motion, t, seconds, failure)
+      call driver%finalize()
+      if (allocated(error) .or. .not. allocated(failure)) return
+      failure%message = failure%message//' (rows until then are in '//recorder%file%path// &
+                        trim(merge(', of an earlier run)', ')                   ', earlier))
+      call move_alloc(failure, error)
+   end subroutine run_case
+
+   !> What `run_case` would refuse of the steps of a case, exit code 2: see `rodyn_step_limit`.
+   subroutine check_steps(config, name, error)
+      type(case_config), intent(in) :: config
+      character(len=*), intent(in) :: name !! of the case
+      type(error_type), allocatable, intent(out) :: error
+      type(run_setup) :: setup
+
+      if (.not. config%solver%fixed_step > 0.0_wp) return
+      call new_run_setup(setup, config, .false., error)
+      if (.not. allocated(error)) call check_fixed_step(trim(config%solver%method), config%solver%solver_options, &
+                                                        setup%motion%dynamics%scene, setup%y, config%t_end, error)
+      if (allocated(error)) error%message = name//': '//error%message
+   end subroutine check_steps
+
+   !> Create the file.
+   subroutine begin_file(recorder, motion, config, path, replace, notes, error, input_text)
+      type(recorder_type), intent(inout) :: recorder
+      type(motion_type), intent(in) :: motion
+      type(case_config), intent(in) :: config
+      character(len=*), intent(in) :: path
+      logical, intent(in) :: replace
+      character(len=*), intent(in) :: notes
+      type(error_type), allocatable, intent(out) :: error
+      character(len=*), intent(in), optional :: input_text
+      type(run_header) :: header
 
       header%title = ''
       if (allocated(config%title)) header%title = config%title
       header%input = ''
+      if (present(input_text)) header%input = input_text
       header%resolved_input = resolved_case(config)
+      header%notes = notes
       header%sundials_version = sundials_version()
       header%layout = layout_of(config)
       header%n_rows = config%n_outputs + 1
       header%compression = config%output%compression
-      if (present(input_text)) header%input = input_text
       call recorder%file%create(path, header, replace, error)
       if (allocated(error)) return
       recorder%row = new_row(header%layout)
       recorder%kinetic = header%layout%before('energy_kinetic') + 1
       recorder%elastic = header%layout%before('energy_elastic') + 1
       recorder%residual = header%layout%before('energy_residual') + 1
-      recorder%validity = new_validity(scene, header%layout, config%model%deflection_limit)
-      call simulate(motion, driver, even_times(config%t_end, config%n_outputs), config%t_end, recorder, y, t, failure)
-      call progress%finish()
-      call system_clock(clock_end)
-      earlier = .false.
-      if (allocated(failure)) then
-         if (failure%exit_code == exit_stopped) call recorder%file%stop_at(path//'.stopped', .not. present(load), earlier)
-      end if
-      if (earlier) call recorder%file%discard()
-      if (motion%events%watches .and. .not. earlier) call write_events(recorder%file, motion, error)
-      if (.not. (earlier .or. allocated(error))) &
-         call close_file(recorder, driver, motion, config, failure, &
-                      real(clock_end - clock_start, wp)/real(clock_rate, wp), error)
-      written = recorder%file%path ! a run that has stopped or failed may have stepped aside
-      if (.not. silent .and. .not. allocated(error)) call print_events(motion, recorder%energy_scale)
-      if (.not. silent .and. .not. allocated(error)) &
-         call print_result(driver, recorder, written, config, t, &
-                           real(clock_end - clock_start, wp)/real(clock_rate, wp), failure)
-      call driver%finalize()
-      if (allocated(error)) return
-      if (allocated(failure)) then
-         failure%message = failure%message//' (rows until then are in '//written// &
-                           trim(merge(', of an earlier run)', ')                   ', earlier))
-         call move_alloc(failure, error)
-      end if
-   end subroutine run_case
-
-   !> What `run_case` would refuse of the steps of a case, exit code 2: see `rodyn_step_limit`.
-   subroutine check_steps(config, scene, name, error)
-      type(case_config), intent(in) :: config
-      type(scene_type), intent(in) :: scene !! the case, compiled
-      character(len=*), intent(in) :: name  !! of the case
-      type(error_type), allocatable, intent(out) :: error
-      type(motion_type) :: motion
-      real(wp), allocatable :: y(:)
-
-      if (.not. config%solver%fixed_step > 0.0_wp) return
-      call new_motion(motion, scene, .false., error)
-      if (allocated(error)) return
-      call initial_state(motion, config%initial, y)
-      call check_fixed_step(trim(config%solver%method), config%solver%solver_options, scene, y, config%t_end, error)
-      if (allocated(error)) error%message = name//': '//error%message
-   end subroutine check_steps
+      recorder%validity = new_validity(motion%dynamics%scene, header%layout, config%model%deflection_limit)
+   end subroutine begin_file
 
    !> Write one row.
    subroutine observe(self, motion, t, y, error)
@@ -189,6 +181,32 @@ contains
       call self%validity%observe(self%row)
       call self%file%append(self%row, error)
    end subroutine observe
+
+   !> Events, attributes and the final name, whatever has ended the run: one that was stopped may step aside, or yield to an earlier
+   !> one that has more rows.
+   subroutine end_file(recorder, driver, motion, config, path, may_resume, seconds, failure, earlier, error)
+      type(recorder_type), intent(inout) :: recorder
+      type(driver_type), intent(inout) :: driver
+      type(motion_type), intent(in) :: motion
+      type(case_config), intent(in) :: config
+      character(len=*), intent(in) :: path
+      logical, intent(in) :: may_resume !! the file alone says what was run
+      real(wp), intent(in) :: seconds   !! wall time of the run [s]
+      type(error_type), allocatable, intent(in) :: failure
+      logical, intent(out) :: earlier   !! the rows of an earlier run are kept instead
+      type(error_type), allocatable, intent(out) :: error
+
+      earlier = .false.
+      if (allocated(failure)) then
+         if (failure%exit_code == exit_stopped) call recorder%file%stop_at(path//'.stopped', may_resume, earlier)
+      end if
+      if (earlier) then
+         call recorder%file%discard()
+         return
+      end if
+      if (motion%events%watches) call write_events(recorder%file, motion, error)
+      if (.not. allocated(error)) call close_file(recorder, driver, motion, config, failure, seconds, error)
+   end subroutine end_file
 
    !> Attributes of the solver, status, and the final name.
    subroutine close_file(recorder, driver, motion, config, failure, seconds, error)
@@ -276,26 +294,26 @@ contains
    end subroutine print_lines
 
    !> Last lines on the terminal.
-   subroutine print_result(driver, recorder, path, config, t, seconds, failure)
+   subroutine print_result(driver, recorder, motion, t, seconds, failure)
       type(driver_type), intent(inout) :: driver
       type(recorder_type), intent(in) :: recorder
-      character(len=*), intent(in) :: path
-      type(case_config), intent(in) :: config
+      type(motion_type), intent(in) :: motion
       real(wp), intent(in) :: t, seconds
       type(error_type), allocatable, intent(in) :: failure !! why the run ended early
       type(solver_statistics) :: stats
       character(len=8) :: outcome
 
+      call print_events(motion, recorder%energy_scale)
       stats = driver%statistics()
       outcome = 'done'
       if (allocated(failure)) outcome = merge('stopped', 'failed ', failure%exit_code == exit_stopped)
       call print_line(outcome//'t = '//time_text(t)//' s, '//to_text(stats%n_steps)//' steps, '// &
          to_text(stats%n_rhs)//' right-hand sides, '//formatted(seconds, '(f20.3)')//' s')
       call print_lines('method ', driver%history)
-      if (config%output%ledger) call print_line('ledger  largest energy residual '// &
+      if (motion%ledger) call print_line('ledger  largest energy residual '// &
          formatted(recorder%worst_residual, '(es8.1)')//' J of '//formatted(recorder%energy_scale, '(es8.1)')//' J')
       call print_lines('warning', recorder%validity%warnings())
-      call print_line('file    '//path)
+      call print_line('file    '//recorder%file%path)
    end subroutine print_result
 
 end module rodyn_run

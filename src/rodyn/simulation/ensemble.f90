@@ -10,19 +10,16 @@ module rodyn_ensemble
    use rodyn_lanes, only: lanes
    use rodyn_lane_dop853, only: lane_dop853, new_lane_dop853, at_nothing, at_output, at_stop, at_failure
    use rodyn_lane_motion, only: lane_motion, new_lane_motion
-   use rodyn_motion, only: motion_type
+   use rodyn_run_setup, only: run_setup
    use rodyn_switch_times, only: interval_ends
    implicit none (type, external)
    private
    public :: ensemble_member, ensemble_client, run_ensemble
 
    !> A case on its way. Extend it by what the client wants to know of it.
-   type :: ensemble_member
-      type(motion_type) :: motion          !! without ledger
+   type, extends(run_setup) :: ensemble_member !! without ledger
       type(solver_options) :: options
-      real(wp), allocatable :: y(:)        !! state at t (n_states); the client sets that at t = 0
       real(wp), allocatable :: times(:)    !! increasing, within [0, t_end]: states at these are shown to the client [s]
-      real(wp) :: t_end = 0.0_wp           !! [s]
       real(wp) :: limit = 0.0_wp           !! of `seconds`; 0: none [s]
       real(wp) :: t = 0.0_wp               !! last good time [s]
       real(wp) :: seconds = 0.0_wp         !! its share of the wall time: that of a pass is divided among the lanes in use [s]

@@ -12,12 +12,13 @@ module rodyn_sweep_case
    use rodyn_linear_model, only: linear_model
    use rodyn_modes_at_start, only: modes_at_start
    use rodyn_modes, only: mode_set
-   use rodyn_motion, only: motion_type, new_motion, initial_state
+   use rodyn_motion, only: motion_type, new_motion
    use rodyn_namelist_document, only: namelist_document
    use rodyn_namelist_edit, only: set_value
    use rodyn_quantities, only: row_layout, row_type, fill_row, layout_of, new_row, resized
    use rodyn_rod_profile, only: mean_mass_factors
-   use rodyn_scene, only: scene_type, new_scene
+   use rodyn_run_setup, only: run_setup, new_run_setup
+   use rodyn_scene, only: scene_type
    use rodyn_switch_times, only: same_time
    use rodyn_simulation, only: observer_type, listed_times, simulate
    use rodyn_sweep_config, only: sweep_axis, sweep_config, is_ratio, short_value_text
@@ -255,39 +256,32 @@ contains
    end subroutine make_nan
 
    !> Everything about a case that comes before its integration, frequencies among it. `keeper%kept` is the caller's to set.
-   subroutine prepare_case(sweep, plan, shape, case, pulse, clock_start, motion, y, times, t_end, keeper, driver, late, error)
+   subroutine prepare_case(sweep, plan, shape, case, pulse, clock_start, setup, times, keeper, driver, late, error)
       type(sweep_config), intent(in) :: sweep
       type(sweep_plan), intent(in) :: plan
       type(case_shape), intent(in) :: shape
       integer, intent(in) :: case
       class(pulse_type), target, intent(inout) :: pulse
       integer(i8), intent(in) :: clock_start         !! when work on the case began [counts]
-      type(motion_type), target, intent(inout) :: motion !! must outlive the driver
-      real(wp), allocatable, intent(out) :: y(:)     !! state at t = 0
+      type(run_setup), target, intent(inout) :: setup !! must outlive the driver
       real(wp), allocatable, intent(out) :: times(:) !! at which the keeper wants to see it [s]
-      real(wp), intent(out) :: t_end                 !! [s]
       type(keeper_type), intent(inout) :: keeper
       type(driver_type), intent(out) :: driver       !! without a monitor
       logical, target, intent(out) :: late           !! the choice of the method alone took longer than the case may
       type(error_type), allocatable, intent(out) :: error
       type(case_config) :: config
-      type(scene_type) :: scene
       type(case_monitor), target :: monitor
 
       late = .false.
-      t_end = 0.0_wp
       call build_case(sweep, plan, case, config, error)
-      if (.not. allocated(error)) call new_scene(scene, config, error)
-      if (.not. allocated(error)) call new_motion(motion, scene, .false., error)
+      if (.not. allocated(error)) call new_run_setup(setup, config, .false., error)
       if (allocated(error)) return
-      t_end = config%t_end
-      if (sweep%frequencies > 0) call keep_frequencies(scene, config, sweep%at_equilibrium, keeper%kept, error)
+      if (sweep%frequencies > 0) call keep_frequencies(setup%motion%dynamics%scene, config, sweep%at_equilibrium, &
+                                                       keeper%kept, error)
       if (allocated(error) .or. .not. sweep%integrate) return
-      motion%events%most = config%solver%max_events
-      call initial_state(motion, config%initial, y)
       monitor = new_monitor(sweep, pulse, clock_start, late)
       call merge_times(config, sweep%probe_times, shape%outputs, times, keeper%probe_of, keeper%output_of)
-      call new_driver(driver, motion, y, config%solver, t_end, size(times), error, monitor)
+      call new_driver(driver, setup%motion, setup%y, config%solver, config%t_end, size(times), error, monitor)
       nullify (driver%monitor)
       if (allocated(error)) return
       if (driver%choice%tried) then
@@ -295,9 +289,9 @@ contains
          if (allocated(error)) return
       end if
       keeper%layout = shape%layout
-      keeper%row = new_row(resized(shape%layout, scene%n))
-      keeper%validity = new_validity(scene, keeper%row%layout, config%model%deflection_limit)
-      keeper%t_end = t_end
+      keeper%row = new_row(resized(shape%layout, config%chain%n_rods))
+      keeper%validity = new_validity(setup%motion%dynamics%scene, keeper%row%layout, config%model%deflection_limit)
+      keeper%t_end = config%t_end
       keeper%n_outputs = config%n_outputs
       keeper%keep_series = sweep%keep_series
    end subroutine prepare_case
@@ -329,14 +323,13 @@ contains
    end subroutine keep_frequencies
 
    !> Integrate a prepared case by itself, and keep what is wanted.
-   subroutine integrate_case(sweep, driver, times, t_end, pulse, clock_start, motion, y, keeper, late, error)
+   subroutine integrate_case(sweep, driver, setup, times, pulse, clock_start, keeper, late, error)
       type(sweep_config), intent(in) :: sweep
       type(driver_type), intent(inout) :: driver !! for this motion
-      real(wp), intent(in) :: times(:), t_end   !! [s]
+      type(run_setup), target, intent(inout) :: setup
+      real(wp), intent(in) :: times(:)          !! at which the keeper wants to see it [s]
       class(pulse_type), target, intent(inout) :: pulse
       integer(i8), intent(in) :: clock_start    !! when work on the case began [counts]
-      type(motion_type), target, intent(inout) :: motion
-      real(wp), contiguous, intent(inout) :: y(:)
       type(keeper_type), intent(inout) :: keeper
       logical, target, intent(out) :: late      !! it took longer than it may
       type(error_type), allocatable, intent(out) :: error
@@ -348,30 +341,29 @@ contains
       monitor = new_monitor(sweep, pulse, clock_start, late)
       call driver%set_monitor(monitor)
       call system_clock(clock_a, clock_rate)
-      call simulate(motion, driver, listed_times(times), t_end, keeper, y, keeper%kept%t_reached, error)
+      call simulate(setup%motion, driver, listed_times(times), setup%t_end, keeper, setup%y, keeper%kept%t_reached, error)
       call system_clock(clock_b)
       keeper%kept%integration_seconds = real(clock_b - clock_a, wp)/real(clock_rate, wp)
       stats = driver%statistics()
       keeper%kept%n_steps = stats%n_steps
       keeper%kept%n_rhs = stats%n_rhs
-      if (.not. allocated(error)) call keep_final(motion, t_end, y, keeper, error)
+      if (.not. allocated(error)) call keep_final(setup, keeper, error)
       if (.not. allocated(error) .and. len(driver%failures) > 0) keeper%kept%message = &
          in_one_line(joined(driver%failures, keeper%kept%message))
       call driver%finalize()
    end subroutine integrate_case
 
    !> Keep the state at the end of a case.
-   subroutine keep_final(motion, t_end, y, keeper, error)
-      type(motion_type), intent(in) :: motion
-      real(wp), intent(in) :: t_end, y(:)
+   subroutine keep_final(setup, keeper, error)
+      class(run_setup), intent(in) :: setup !! with the state at the end
       type(keeper_type), intent(inout) :: keeper
       type(error_type), allocatable, intent(out) :: error
 
-      if (.not. all(abs(y) <= huge(y))) then
+      if (.not. all(abs(setup%y) <= huge(setup%y))) then
          call raise(error, 'the final state is not finite')
          return
       end if
-      call fill_row(motion, t_end, y, 0.0_wp, keeper%row)
+      call fill_row(setup%motion, setup%t_end, setup%y, 0.0_wp, keeper%row)
       call keeper%validity%observe(keeper%row)
       keeper%kept%message = in_one_line(keeper%validity%warnings())
       call place(keeper%row, keeper%layout, keeper%kept%final)

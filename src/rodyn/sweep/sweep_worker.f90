@@ -226,8 +226,8 @@ contains
       new%ticket = ticket
       call clear_result(new%kept, self%shape, case)
       new%keeper%kept => new%kept
-      call prepare_case(self%sweep, self%plan, self%shape, case, self%feed, clock_start, new%motion, new%y, new%times, &
-                        new%t_end, new%keeper, driver, late, error)
+      call prepare_case(self%sweep, self%plan, self%shape, case, self%feed, clock_start, new%run_setup, new%times, new%keeper, &
+                        driver, late, error)
       if (.not. allocated(error) .and. self%sweep%integrate) then
          new%choice = driver%choice
          new%options = driver%choice%options
@@ -237,8 +237,7 @@ contains
             new%preparation = real(clock_end - clock_start, wp)/real(rate, wp)
             return
          end if
-         call integrate_case(self%sweep, driver, new%times, new%t_end, self%feed, clock_start, new%motion, new%y, &
-                             new%keeper, late, error)
+         call integrate_case(self%sweep, driver, new%run_setup, new%times, self%feed, clock_start, new%keeper, late, error)
       end if
       call system_clock(clock_end)
       associate (kept => new%kept)
@@ -293,8 +292,7 @@ contains
                call begin_case(self, member%ticket, kept%case, .false., work_type(kept%n_steps, kept%n_rhs, kept%wall_seconds, &
                                                                                   kept%integration_seconds), none)
             else
-               if (.not. allocated(member%error)) &
-                  call keep_final(member%motion, member%t_end, member%y, member%keeper, member%error)
+               if (.not. allocated(member%error)) call keep_final(member, member%keeper, member%error)
                call conclude_case(self%sweep, member%keeper, member%late, member%error, kept)
                call self%feed%keep(member%ticket, kept, stop_now)
                self%stopped = self%stopped .or. stop_now
