@@ -4,7 +4,7 @@
 !>     z = (w Vx, w Vy, w^2, phi_m'(2 w + phi_m'), (w + phi_m') alpha_m', (w + phi_m') beta_m'),  m = 1..n;
 !> the article joins the last two for uniform rods, where int m Na = -int m Nb. On a fixed spacecraft the first
 !> three rows and columns are absent. Bubbles stand behind beta and are treated like alpha and beta. For massless rods
-!> all rod integrals are zero. Locked hinges: `rodyn_locks`.
+!> all rod integrals are zero. Locked hinges: `rodyn_locks`. The same equations elsewhere: docs/model.md sec. 7.
 module rodyn_assembled
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp

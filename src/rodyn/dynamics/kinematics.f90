@@ -1,4 +1,5 @@
 !> Positions, velocities, energies and momenta of a scene in a given state, docs/model.md sec. 1 and 2. O(n).
+!> The same equations elsewhere: docs/model.md sec. 7.
 module rodyn_kinematics
    use rodyn_kinds, only: wp
    use rodyn_scene, only: scene_type

@@ -1,5 +1,5 @@
 !> Moments of the hinges between rods without bending unknowns, in all lanes at once: `rodyn_hinge_law` and
-!> `rodyn_three_moments`, same equations.
+!> `rodyn_three_moments` in lanes. The same equations elsewhere: docs/model.md sec. 7.
 module rodyn_lane_hinges
    use rodyn_kinds, only: wp
    use rodyn_lanes, only: lanes

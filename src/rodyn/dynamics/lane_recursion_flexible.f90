@@ -4,6 +4,7 @@
 !> Each loop over lanes is one pass of vector instructions; what a lane computes never depends on another one. Lanes do not wait
 !> for the rod before as one scene does, so W' is eliminated first and the axes are turned then, with fewer operations. All
 !> steps are parts of one procedure: given their arrays as arguments, gfortran would take two rods, but one lane at a time (10 %).
+!> The same equations elsewhere: docs/model.md sec. 7.
 module rodyn_lane_recursion_flexible
    use rodyn_kinds, only: wp
    use rodyn_lanes, only: lanes

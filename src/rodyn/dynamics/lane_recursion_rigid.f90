@@ -5,7 +5,7 @@
 !> `rodyn_recursion_lumped`, P = a e e' with a = det/pnn. So that no digits are lost then, the centripetal part of the bias
 !> force is written with the apparent mass after elimination of W', not as a difference of two large terms:
 !>     pee - l^2 pen^2/(m2 + l^2 pnn) = (pee m2 + l^2 det)/(m2 + l^2 pnn).
-!> What a lane computes never depends on another one.
+!> What a lane computes never depends on another one. The same equations elsewhere: docs/model.md sec. 7.
 module rodyn_lane_recursion_rigid
    use rodyn_kinds, only: wp
    use rodyn_lanes, only: lanes

@@ -1,6 +1,7 @@
 !> The spacecraft that carries a chain in all lanes at once: the equations of `rodyn_spacecraft_accelerations` in the order with
 !> the fewest operations, as lanes do not wait for each other: A_C follows from w', which is
 !>     (J0 d2 + M0 (M0 rr.P rr + det P r^2)) w' = (M_C + T_0) d2 - rr.((M0 P + det P) F + M0 adj(M0 + P) c).
+!> The same equations elsewhere: docs/model.md sec. 7.
 module rodyn_lane_spacecraft
    use rodyn_kinds, only: wp
    use rodyn_lanes, only: lanes

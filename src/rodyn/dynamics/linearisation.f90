@@ -4,6 +4,7 @@
 !> (dq, dp) with the accelerations a held fixed: one pass outward for the motion of the nodes, one inward for the
 !> forces, O(n) a direction. Then dR/dq is the tangent stiffness, dR/dp the damping and gyroscopic matrix, and
 !>     d a = -M^-1 (dR/dq dq + dR/dp dp).
+!> The same equations elsewhere: docs/model.md sec. 7.
 module rodyn_linearisation
    use rodyn_kinds, only: wp
    use rodyn_scene, only: scene_type

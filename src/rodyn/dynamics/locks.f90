@@ -4,7 +4,7 @@
 !>     phi_{k+1} = phi_k + beta_k - alpha_{k+1} + opening_k                 (alpha, beta: with dynamic bending)
 !> which is linear: with z the other coordinates, dq = T dz. `reduce` applies T^T to forces, `expand` applies T to changes,
 !> and a symmetric matrix becomes T^T M T; all keep their size, with zeros (ones on the diagonal of M) for what is slaved.
-!> With quasistatic bending nothing is redundant: see `rodyn_hinge_law`.
+!> With quasistatic bending nothing is redundant: see `rodyn_hinge_law`. The same equations elsewhere: docs/model.md sec. 7.
 module rodyn_locks
    use rodyn_kinds, only: wp
    use rodyn_scene, only: scene_type

@@ -292,85 +292,102 @@ contains
       real(wp), allocatable :: a(:, :), scale(:), re(:), im(:), vectors(:, :), doubt(:)
       character(len=kind_length), allocatable :: kind(:)
       complex(wp), allocatable :: eigenvalue(:)
-      integer, allocatable :: order(:), neutral(:)
-      logical, allocatable :: mask(:)
-      integer :: i, n_rigid, n_known, n_zero
+      integer, allocatable :: which(:)
+      integer :: i, n_rigid, n_known, n_zero, n_neutral
 
       call first_order_matrix(a, scale, model, reduced)
       call eigen(a, scale, modes%fastest**2, with_shapes, re, im, vectors, doubt, error)
       if (allocated(error)) return
       ! Zeros that must be there: the spin if angular momentum stays or nothing feels it, and folding at hinges without spring.
       n_rigid = 2*reduced%nw
+      if (keeps_spin(model, reduced, modes%fastest)) n_rigid = 3
+      n_known = n_rigid - 2*reduced%nw
       n_zero = 0
-      n_known = 0
-      if (keeps_spin()) then
-         n_rigid = 3
-         n_known = 1
-      end if
       if (at_rest) then
          n_zero = model%n_free_hinges
          n_known = n_known + n_zero + model%n_idle_hinges
       end if
+      call select_modes(n_known, scale, vectors, doubt, re, im, which, n_neutral)
+      eigenvalue = cmplx(re(which), im(which), wp)
+      allocate (kind(size(which)))
+      kind = relaxation
+      where (im(which) > 0.0_wp) kind = oscillation
+      kind(:n_neutral) = mechanism
+      call begin_modes(modes, model, reduced, eigenvalue, kind, n_rigid, n_zero, with_shapes)
+      modes%uncertainty(n_rigid + n_zero + 1:) = doubt(which)
+      if (.not. with_shapes) return
+      do i = 1, size(which)
+         associate (vector => vector_of(vectors, im, which(i)))
+            modes%shape(:, n_rigid + n_zero + i) = moving_shape(model, reduced, scale, eigenvalue(i), vector)
+         end associate
+      end do
+   end subroutine general_modes
+
+   !> Does a change of the spin stay as it is?
+   logical function keeps_spin(model, reduced, fastest)
+      type(linear_model), intent(in) :: model
+      type(reduced_model), intent(in) :: reduced
+      real(wp), intent(in) :: fastest !! [1/s]
+      keeps_spin = .false.
+      if (reduced%nw == 0) return
+      keeps_spin = (model%is_steady(fastest) .and. .not. model%loaded) .or. &
+                   maxval(abs(reduced%c(:, 1))) <= 1.0e3_wp*epsilon(1.0_wp)*maxval(abs(model%mass))*maxval(abs(model%p(1:2)))
+   end function keeps_spin
+
+   !> Which eigenvalues are modes, one of each complex pair: motions that nothing holds, whose eigenvalues become exact zeros, then
+   !> oscillations, then real ones, each by rising magnitude.
+   subroutine select_modes(n_known, scale, vectors, doubt, re, im, which, n_neutral)
+      integer, intent(in) :: n_known !! of the smallest: left out
+      real(wp), intent(in) :: scale(:), vectors(:, :), doubt(:) !! as `eigen` has them
+      real(wp), intent(inout) :: re(:), im(:)
+      integer, allocatable, intent(out) :: which(:)
+      integer, intent(out) :: n_neutral !! motions that nothing holds
+      integer, allocatable :: order(:), neutral(:)
+      logical, allocatable :: mask(:)
+
       order = rising_order(hypot(re, im))
       allocate (mask(size(re)))
       mask = im(order) >= 0.0_wp
       mask(:n_known) = .false.
       order = pack(order, mask)
-      neutral = motions_of_zeros(pack(order, hypot(re(order), im(order)) <= doubt(order)))
+      neutral = motions_of_zeros(scale, vectors, im, pack(order, hypot(re(order), im(order)) <= doubt(order)))
       order = pack(order, hypot(re(order), im(order)) > doubt(order))
-      order = [neutral, pack(order, im(order) > 0.0_wp), pack(order, .not. im(order) > 0.0_wp)]
+      which = [neutral, pack(order, im(order) > 0.0_wp), pack(order, .not. im(order) > 0.0_wp)]
       re(neutral) = 0.0_wp
       im(neutral) = 0.0_wp
-      eigenvalue = cmplx(re(order), im(order), wp)
-      allocate (kind(size(order)))
-      kind = relaxation
-      where (im(order) > 0.0_wp) kind = oscillation
-      kind(:size(neutral)) = mechanism
-      call begin_modes(modes, model, reduced, eigenvalue, kind, n_rigid, n_zero, with_shapes)
-      modes%uncertainty(n_rigid + n_zero + 1:) = doubt(order)
-      if (.not. with_shapes) return
-      do i = 1, size(order)
-         associate (vector => vector_of(vectors, im, order(i)))
-            modes%shape(:, n_rigid + n_zero + i) = moving_shape(model, reduced, scale, eigenvalue(i), vector)
-         end associate
+      n_neutral = size(neutral)
+   end subroutine select_modes
+
+   !> One of the zeros for each of the motions that they stand for: two zeros of one motion differ in its rate only.
+   function motions_of_zeros(scale, vectors, im, zeros) result(motions)
+      real(wp), intent(in) :: scale(:), vectors(:, :), im(:)
+      integer, intent(in) :: zeros(:)
+      integer, allocatable :: motions(:)
+      complex(wp) :: x(size(scale)), other(size(scale))
+      integer :: j, k
+
+      allocate (motions(0))
+      do j = 1, size(zeros)
+         x = place_of(zeros(j))
+         do k = 1, size(motions)
+            other = place_of(motions(k))
+            if (abs(dot_product(x, other))**2 > 0.99_wp*real(dot_product(x, x)*dot_product(other, other), wp)) exit
+         end do
+         if (k > size(motions)) motions = [motions, zeros(j)]
       end do
 
    contains
 
-      !> One of the zeros for each of the motions that they stand for: two zeros of one motion differ in its rate only.
-      function motions_of_zeros(zeros) result(motions)
-         integer, intent(in) :: zeros(:)
-         integer, allocatable :: motions(:)
-         complex(wp) :: x(reduced%nc), other(reduced%nc)
-         integer :: j, k
-
-         allocate (motions(0))
-         do j = 1, size(zeros)
-            x = place_of(vector_of(vectors, im, zeros(j)))
-            do k = 1, size(motions)
-               other = place_of(vector_of(vectors, im, motions(k)))
-               if (abs(dot_product(x, other))**2 > 0.99_wp*real(dot_product(x, x)*dot_product(other, other), wp)) exit
-            end do
-            if (k > size(motions)) motions = [motions, zeros(j)]
-         end do
-      end function motions_of_zeros
-
       !> What a vector does to the chain's place.
-      pure function place_of(vector) result(x)
-         complex(wp), intent(in) :: vector(:)
-         complex(wp) :: x(reduced%nc)
-         x = vector(:reduced%nc)/scale
+      pure function place_of(i) result(x)
+         integer, intent(in) :: i
+         complex(wp) :: x(size(scale))
+         complex(wp) :: vector(size(vectors, 1))
+         vector = vector_of(vectors, im, i)
+         x = vector(:size(scale))/scale
       end function place_of
 
-      !> Does a change of the spin stay as it is?
-      logical function keeps_spin()
-         keeps_spin = .false.
-         if (reduced%nw == 0) return
-         keeps_spin = (model%is_steady(modes%fastest) .and. .not. model%loaded) .or. &
-                      maxval(abs(reduced%c(:, 1))) <= 1.0e3_wp*epsilon(1.0_wp)*maxval(abs(model%mass))*maxval(abs(model%p(1:2)))
-      end function keeps_spin
-
-   end subroutine general_modes
+   end function motions_of_zeros
 
    !> d/dt (scale eta, th, spin, eta') = A (...), spin = sqrt(inertia) (w + follow . x'), x = basis eta.
    subroutine first_order_matrix(a, scale, model, reduced)

@@ -6,6 +6,7 @@
 !>
 !> The mass matrix is never inverted: with z the change of p', xp = rp + g z and xq = rq + g xp, and z solves the
 !> linearised balance of forces (`rodyn_newton_chain`, `rodyn_newton_series`, `rodyn_newton_root`).
+!> The same equations elsewhere: docs/model.md sec. 7.
 module rodyn_newton
    use rodyn_kinds, only: wp
    use rodyn_scene, only: scene_type
@@ -14,7 +15,7 @@ module rodyn_newton
    use rodyn_newton_tangent, only: rod_tangent, linearise_rods
    use rodyn_newton_root, only: newton_root
    use rodyn_newton_chain, only: rod_factor, factorise_chain, reduce_chain, expand_chain
-   use rodyn_newton_series, only: series_factor, factorise_series, reduce_series, expand_series
+   use rodyn_newton_series, only: series_factor, factorise_series, reduce_series, expand_series, of_opening
    implicit none (type, external)
    private
    public :: newton_type
@@ -222,7 +223,7 @@ contains
       end do
       do i = 1, size(scene%hinges%relaxing)
          k = scene%hinges%relaxing(i)
-         xq(scene%n_dof + i) = self%opening(k) + self%gamma**2*self%left(2, k + 1)
+         xq(scene%n_dof + i) = self%opening(k) + self%gamma**2*self%left(of_opening, k + 1)
       end do
    end subroutine add_rods
 

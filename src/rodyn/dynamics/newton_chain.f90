@@ -12,6 +12,7 @@
 !> Had phi been eliminated before, it would be the difference of two stiffnesses.
 !>
 !> Rigid rods have t = phi alone. Massless rods that bend are in `rodyn_newton_series`.
+!> The same equations elsewhere: docs/model.md sec. 7.
 module rodyn_newton_chain
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp

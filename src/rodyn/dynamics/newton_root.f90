@@ -3,7 +3,7 @@
 !>
 !> With dq = dq0 + g^2 x, dp = dp0 + g x (g: CVODE's gamma, x: change of p'), hinge 0 accelerates by
 !>     dA = J x + dA0,   J = ((1, -g w, -y0 - g Vy - 2 g w x0), (g w, 1, x0 + g Vx - 2 g w y0)),
-!> and the chain answers with a force P dA + ... and a moment.
+!> and the chain answers with a force P dA + ... and a moment. The same equations elsewhere: docs/model.md sec. 7.
 module rodyn_newton_root
    use rodyn_kinds, only: wp
    use rodyn_spacecraft, only: spacecraft_body

@@ -9,6 +9,7 @@
 !> The chain beyond hinge k - 1 is seen as in `rodyn_newton_chain`, with two rotations and two moments:
 !>     (fe, fn, -T, -m) = P (dAe, dAn, tau_s, tau_x) + P_w w' + b.
 !> The moments are unknowns themselves, not differences of stiff springs' ends, so no stiffness costs digits.
+!> The same equations elsewhere: docs/model.md sec. 7.
 module rodyn_newton_series
    use rodyn_kinds, only: wp
    use rodyn_rod_constants, only: rod_constants
@@ -17,7 +18,14 @@ module rodyn_newton_series
    private
    public :: series_factor, factorise_series, reduce_series, expand_series
 
-   !> What elimination of a rod leaves. Its unknowns: phi, s_{k-1}, T_{k-1}, T_k, m_k.
+   ! Unknowns of rod k: its rotation, opening and moment of the inner hinge, moments of the outer one; what its inner end does.
+   integer, parameter, public :: of_phi = 1, of_opening = 2 !! phi, s_{k-1}
+   integer, parameter :: of_moment = 3, of_moment_out = 4, of_spring_out = 5 !! T_{k-1}, T_k, m_k
+   integer, parameter :: by_ae = 1, by_an = 2, by_tau_s = 3, by_tau_x = 4, by_w = 5
+   ! Rows of the chain beyond a hinge: force, -T, -m.
+   integer, parameter :: on_ae = 1, on_an = 2, on_moment = 3, on_spring = 4
+
+   !> What elimination of a rod leaves.
    type :: series_factor
       real(wp) :: outer(4, 2)   !! P beyond the outer node, mass there included, columns dAe, dAn
       real(wp) :: ae_w, ae_phi, an_phi !! as in `rod_factor`
@@ -52,8 +60,8 @@ contains
       ok = .true.
       do k = n, 1, -1
          associate (rod => rods(rod_of(k)), t => tangent(k), f => factor(k))
-            p(1, 1) = p(1, 1) + node_mass(k)
-            p(2, 2) = p(2, 2) + node_mass(k)
+            p(on_ae, by_ae) = p(on_ae, by_ae) + node_mass(k)
+            p(on_an, by_an) = p(on_an, by_an) + node_mass(k)
             f%outer = p(:, 1:2)
             f%ae_w = -2.0_wp*gamma*rod%length*t%w
             f%ae_phi = f%ae_w - gamma**2*rod%length*t%wr
@@ -63,15 +71,15 @@ contains
             call invert(own, f%inverse, ok)
             if (.not. ok) return
             f%by_inner = matmul(f%inverse, inner)
-            p(1:2, 3:4) = 0.0_wp
+            p(1:2, by_tau_s:by_tau_x) = 0.0_wp
             p(1:2, :) = p(1:2, :) - matmul(f%force, f%by_inner)
-            p(3, :) = f%by_inner(3, :)
-            p(4, :) = f%stiffness*f%by_inner(2, :)
+            p(on_moment, :) = f%by_inner(of_moment, :)
+            p(on_spring, :) = f%stiffness*f%by_inner(of_opening, :)
             call turn_axes(t%cd, t%sd, p)
          end associate
       end do
       apparent = p(1:3, 1:2)
-      by_omega = p(1:3, 5)
+      by_omega = p(1:3, by_w)
    end subroutine factorise_series
 
    !> Equations of phi, s, T, T_k, m_k: by these unknowns (own) and by the motion of the inner end (inner). The last two
@@ -93,34 +101,34 @@ contains
       end associate
       f%bend = f%slope/gamma**2
       spring = gamma**2*f%stiffness
-      answer(:, 1) = p(:, 1)*f%ae_phi + p(:, 2)*f%an_phi + p(:, 3) + p(:, 4)
-      answer(:, 2) = p(:, 4)*f%slope(2)*f%stiffness
-      answer(:, 3) = p(:, 3)*f%bend(2)
-      answer(:, 4) = p(:, 3)*f%bend(3)
-      answer(:, 5) = p(:, 4)*f%slope(3)
-      p(:, 5) = p(:, 5) + p(:, 1)*f%ae_w + p(:, 2)*rod%length
-      f%force = answer(1:2, :)
+      answer(:, of_phi) = p(:, by_ae)*f%ae_phi + p(:, by_an)*f%an_phi + p(:, by_tau_s) + p(:, by_tau_x)
+      answer(:, of_opening) = p(:, by_tau_x)*f%slope(2)*f%stiffness
+      answer(:, of_moment) = p(:, by_tau_s)*f%bend(2)
+      answer(:, of_moment_out) = p(:, by_tau_s)*f%bend(3)
+      answer(:, of_spring_out) = p(:, by_tau_x)*f%slope(3)
+      p(:, by_w) = p(:, by_w) + p(:, by_ae)*f%ae_w + p(:, by_an)*rod%length
+      f%force = answer(on_ae:on_an, :)
 
-      own(1, :) = rod%length*answer(2, :)
-      own(1, 1) = own(1, 1) + gamma**2*t%phi_phi
-      own(1, 3) = own(1, 3) + 1.0_wp
-      own(1, 4) = own(1, 4) - 1.0_wp
-      own(2, :) = [-1.0_wp, 1.0_wp + f%slope(1)*f%stiffness, 0.0_wp, 0.0_wp, f%slope(2)]
-      own(3, :) = [-spring, -damper, 1.0_wp + f%slope(1)*f%stiffness, f%slope(2)*f%stiffness, 0.0_wp]
-      own(4, :) = answer(3, :)
-      own(4, 4) = own(4, 4) + 1.0_wp
-      own(5, :) = answer(4, :)
-      own(5, 5) = own(5, 5) + 1.0_wp
+      own(of_phi, :) = rod%length*answer(on_an, :)
+      own(of_phi, of_phi) = own(of_phi, of_phi) + gamma**2*t%phi_phi
+      own(of_phi, of_moment) = own(of_phi, of_moment) + 1.0_wp
+      own(of_phi, of_moment_out) = own(of_phi, of_moment_out) - 1.0_wp
+      own(of_opening, :) = [-1.0_wp, 1.0_wp + f%slope(1)*f%stiffness, 0.0_wp, 0.0_wp, f%slope(2)]
+      own(of_moment, :) = [-spring, -damper, 1.0_wp + f%slope(1)*f%stiffness, f%slope(2)*f%stiffness, 0.0_wp]
+      own(of_moment_out, :) = answer(on_moment, :)
+      own(of_moment_out, of_moment_out) = own(of_moment_out, of_moment_out) + 1.0_wp
+      own(of_spring_out, :) = answer(on_spring, :)
+      own(of_spring_out, of_spring_out) = own(of_spring_out, of_spring_out) + 1.0_wp
 
       inner = 0.0_wp
-      do j = 1, 5
-         if (j == 3 .or. j == 4) cycle
-         inner(1, j) = rod%length*p(2, j)
-         inner(4, j) = p(3, j)
-         inner(5, j) = p(4, j)
+      do j = by_ae, by_w
+         if (j == by_tau_s .or. j == by_tau_x) cycle
+         inner(of_phi, j) = rod%length*p(on_an, j)
+         inner(of_moment_out, j) = p(on_moment, j)
+         inner(of_spring_out, j) = p(on_spring, j)
       end do
-      inner(2, 4) = 1.0_wp
-      inner(3, 3) = spring
+      inner(of_opening, by_tau_x) = 1.0_wp
+      inner(of_moment, by_tau_s) = spring
    end subroutine rod_equations
 
    !> From the axes of rod k to those of rod k - 1.
@@ -202,16 +210,17 @@ contains
             along = -length*(2.0_wp*t%w*(d_omega + phi_rate(k)) + t%wr*phi(k))
             across = -length*t%w**2*phi(k)
             b = b + f%outer(:, 1)*along + f%outer(:, 2)*across
-            rows = [length*b(2) + t%phi_phi*phi(k) - (moment(k) - moment(k - 1)), 0.0_wp, 0.0_wp, b(3), b(4)]
+            rows = [length*b(on_an) + t%phi_phi*phi(k) - (moment(k) - moment(k - 1)), 0.0_wp, 0.0_wp, b(on_moment), b(on_spring)]
             left(:, k) = -matmul(f%inverse, rows)
-            b(1:2) = b(1:2) + matmul(f%force, left(:, k))
-            b = [t%cd*b(1) - t%sd*b(2), t%sd*b(1) + t%cd*b(2), -left(3, k), -f%stiffness*left(2, k)]
+            b(on_ae:on_an) = b(on_ae:on_an) + matmul(f%force, left(:, k))
+            b = [t%cd*b(on_ae) - t%sd*b(on_an), t%sd*b(on_ae) + t%cd*b(on_an), -left(of_moment, k), &
+                 -f%stiffness*left(of_opening, k)]
          end associate
       end do
       known = b(1:3)
    end subroutine reduce_series
 
-   !> Outward pass; see `expand_chain`. Row 1 of the answer is phi, row 2 the changes of openings of the hinges.
+   !> Outward pass; see `expand_chain`. The answer has phi in row `of_phi`, changes of the hinges' openings in row `of_opening`.
    pure subroutine expand_series(n, rods, rod_of, tangent, factor, d_omega, phi, phi_rate, omega_rate, hinge_x, hinge_y, left)
       integer, intent(in) :: n
       type(rod_constants), intent(in) :: rods(:)
@@ -226,13 +235,13 @@ contains
       inner = [hinge_x, hinge_y, 0.0_wp, 0.0_wp, omega_rate]
       do k = 1, n
          associate (t => tangent(k), f => factor(k), length => rods(rod_of(k))%length)
-            inner(1:2) = [t%cd*inner(1) + t%sd*inner(2), t%cd*inner(2) - t%sd*inner(1)]
+            inner(by_ae:by_an) = [t%cd*inner(by_ae) + t%sd*inner(by_an), t%cd*inner(by_an) - t%sd*inner(by_ae)]
             left(:, k) = left(:, k) - matmul(f%by_inner, inner)
-            inner(1) = inner(1) - length*(2.0_wp*t%w*(d_omega + phi_rate(k)) + t%wr*phi(k)) + f%ae_w*omega_rate + &
-                       f%ae_phi*left(1, k)
-            inner(2) = inner(2) - length*t%w**2*phi(k) + length*omega_rate + f%an_phi*left(1, k)
-            inner(3) = left(1, k) + f%bend(2)*(left(3, k) + f%outer_ratio*left(4, k))
-            inner(4) = left(1, k) + f%slope(2)*(f%stiffness*left(2, k) + f%outer_ratio*left(5, k))
+            inner(by_ae) = inner(by_ae) - length*(2.0_wp*t%w*(d_omega + phi_rate(k)) + t%wr*phi(k)) + f%ae_w*omega_rate + &
+                           f%ae_phi*left(of_phi, k)
+            inner(by_an) = inner(by_an) - length*t%w**2*phi(k) + length*omega_rate + f%an_phi*left(of_phi, k)
+            inner(by_tau_s) = left(of_phi, k) + f%bend(2)*(left(of_moment, k) + f%outer_ratio*left(of_moment_out, k))
+            inner(by_tau_x) = left(of_phi, k) + f%slope(2)*(f%stiffness*left(of_opening, k) + f%outer_ratio*left(of_spring_out, k))
          end associate
       end do
    end subroutine expand_series

@@ -4,6 +4,7 @@
 !> the force on the inner node (along e and across n) and of the rows of phi, alpha, beta are
 !>     M (dAe, dAn, dW', dalpha'', dbeta'') + G (dW, dalpha', dbeta') + K (dphi, dalpha, dbeta)
 !> with M of docs/model.md sec. 3. The tangent holds G and K, whose columns of phi contain that forces turn with the rod.
+!> The same equations elsewhere: docs/model.md sec. 7.
 module rodyn_newton_tangent
    use rodyn_kinds, only: wp
    use rodyn_scene, only: scene_type

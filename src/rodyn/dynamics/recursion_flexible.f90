@@ -15,7 +15,7 @@
 !>     b' = T^T b + ...,  A_outer = T A_inner + ...,  T = ((cos, sin), (down, kept)),
 !> with the angle from rod to rod in cos and sin, and W' eliminated in down and kept.
 !>
-!> In vector lanes: `rodyn_lane_recursion_flexible`.
+!> The same equations elsewhere, in vector lanes for instance: docs/model.md sec. 7.
 module rodyn_recursion_flexible
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp

@@ -15,9 +15,11 @@
 !>
 !> The other recursions are faster and multiply the differences out on paper. Here they are formed as they stand, which
 !> costs as many digits as what a light rod carries beyond a free hinge is heavier than the rod.
+!> The same equations elsewhere: docs/model.md sec. 7.
 module rodyn_recursion_joints
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp
+   use rodyn_rod_integrals, only: rod_integrals
    use rodyn_scene, only: scene_type
    use rodyn_bending_matrices, only: bending_matrices, most_shapes
    implicit none (type, external)
@@ -94,12 +96,12 @@ contains
             end if
             pass%cd = cosine(k)*cosine(k - 1) + sine(k)*sine(k - 1)
             pass%sd = sine(k)*cosine(k - 1) - cosine(k)*sine(k - 1)
-            call turn_inward(pass%cd, pass%sd, inertia, bias)
+            call turn_axes(pass%cd, pass%sd, inertia, bias)
          end associate
       end do
       call add_node(scene%node_mass(0), inertia)
       call move_spacecraft(scene, p, inertia, bias, base_force, acceleration, node, smallest)
-      call move_rods(recursion, scene, locked, opening_acceleration, node, moment, acceleration)
+      call outward_pass(recursion, scene, locked, opening_acceleration, node, moment, acceleration)
       ok = smallest > 0.0_wp .and. all(ieee_is_finite(acceleration))
    end subroutine joint_accelerations
 
@@ -111,8 +113,7 @@ contains
       inertia(2, 2) = inertia(2, 2) + mass
    end subroutine add_node
 
-   !> H and h of rod k, docs/model.md sec. 3, and of the chain that it carries: node k accelerates by A + l n W' - l W^2 e, its
-   !> end tangent by W' + beta''. Formed in (A, W', x) and brought to tau = W' + alpha''.
+   !> H and h of rod k and of the chain that it carries, in (A, tau, x).
    pure subroutine rod_equations(scene, bending, k, q, p, elastic, inertia, bias, pass, h, c)
       type(scene_type), intent(in) :: scene
       type(bending_matrices), intent(in) :: bending
@@ -122,59 +123,77 @@ contains
       real(wp), intent(in) :: inertia(3, 3), bias(3) !! P and b at node k, axes of rod k
       type(rod_pass), intent(inout) :: pass
       real(wp), intent(out) :: h(most, most), c(most)
-      real(wp), dimension(most_shapes) :: x, rate, curved
-      real(wp) :: w, outer(3), mv
+      real(wp) :: w
       integer :: i, j
 
       w = p(scene%phi_at() + k)
       if (scene%n_base > 0) w = w + p(3)
-      x = scene%bends(k, q)
-      rate = scene%bends(k, p)
-      associate (integrals => scene%rods(scene%rod_of(k))%inertia, length => scene%rods(scene%rod_of(k))%length)
-         ! The rod. (Fixed sizes keep the products off the heap; rows beyond the rod's coordinates are zero.)
-         mv = dot_product(bending%first, x)
-         curved = matmul(bending%second, x)
-         h(:, 1) = 0.0_wp
-         h(:2, 2) = [0.0_wp, integrals%m0]
-         h(1, 1) = integrals%m0
-         h(:3, 3) = [-mv, integrals%m1, integrals%m2 + dot_product(x, curved)]
-         h(1, 4:) = 0.0_wp
-         h(2, 4:) = bending%first
-         h(3, 4:) = bending%turning
-         h(4:, 4:) = bending%inertia
-         c(1) = -w**2*integrals%m1 - 2.0_wp*w*dot_product(bending%first, rate)
-         c(2) = -w**2*mv
-         c(3) = 2.0_wp*w*dot_product(rate, curved)
-         c(4:) = -w**2*matmul(bending%inertia, x)
-         if (elastic) c(4:) = c(4:) + matmul(bending%stiffness, x)
-         ! The chain beyond, moved by A, l W' across and W' + beta''.
-         pass%fall = length*w**2
-         outer = bias - pass%fall*inertia(:, 1)
-         h(1, 1) = h(1, 1) + inertia(1, 1)
-         h(1, 2) = h(1, 2) + inertia(1, 2)
-         h(2, 2) = h(2, 2) + inertia(2, 2)
-         h(:2, 3) = h(:2, 3) + inertia(:2, 3) + length*inertia(:2, 2)
-         h(3, 3) = h(3, 3) + inertia(3, 3) + length*(2.0_wp*inertia(2, 3) + length*inertia(2, 2))
-         c(1:2) = c(1:2) + outer(1:2)
-         c(3) = c(3) + outer(3) + length*outer(2)
-         if (bending%n > 0) then
-            h(:2, 5) = h(:2, 5) + inertia(:2, 3)
-            h(3, 5) = h(3, 5) + inertia(3, 3) + length*inertia(2, 3)
-            h(5, 5) = h(5, 5) + inertia(3, 3)
-            c(5) = c(5) + outer(3)
-            ! W' = tau - alpha'': the column, then the row of alpha.
-            h(4, 4) = h(4, 4) - h(3, 4)
-            h(:3, 4) = h(:3, 4) - h(:3, 3)
-            h(4, 4:) = h(4, 4:) - h(3, 4:)
-            c(4) = c(4) - c(3)
-         end if
+      associate (rod => scene%rods(scene%rod_of(k)))
+         pass%fall = rod%length*w**2
+         call rod_alone(rod%inertia, bending, scene%bends(k, q), scene%bends(k, p), w, elastic, h, c)
+         call add_chain(rod%length, bending%n > 0, inertia, bias - pass%fall*inertia(:, 1), h, c)
       end associate
+      if (bending%n > 0) then ! W' = tau - alpha'': the column, then the row of alpha
+         h(4, 4) = h(4, 4) - h(3, 4)
+         h(:3, 4) = h(:3, 4) - h(:3, 3)
+         h(4, 4:) = h(4, 4:) - h(3, 4:)
+         c(4) = c(4) - c(3)
+      end if
       do i = 2, most
          do j = 1, i - 1
             h(i, j) = h(j, i)
          end do
       end do
    end subroutine rod_equations
+
+   !> The rod, docs/model.md sec. 3, in (A, W', x): the upper triangle of H. (Fixed sizes keep the products off the heap; rows
+   !> beyond the rod's coordinates are zero.)
+   pure subroutine rod_alone(integrals, bending, x, rate, w, elastic, h, c)
+      type(rod_integrals), intent(in) :: integrals
+      type(bending_matrices), intent(in) :: bending
+      real(wp), intent(in) :: x(most_shapes), rate(most_shapes) !! bending coordinates and rates
+      real(wp), intent(in) :: w                                 !! W [rad/s]
+      logical, intent(in) :: elastic
+      real(wp), intent(out) :: h(most, most), c(most)
+      real(wp) :: mv, curved(most_shapes)
+
+      mv = dot_product(bending%first, x)
+      curved = matmul(bending%second, x)
+      h(:, 1) = 0.0_wp
+      h(:2, 2) = [0.0_wp, integrals%m0]
+      h(1, 1) = integrals%m0
+      h(:3, 3) = [-mv, integrals%m1, integrals%m2 + dot_product(x, curved)]
+      h(1, 4:) = 0.0_wp
+      h(2, 4:) = bending%first
+      h(3, 4:) = bending%turning
+      h(4:, 4:) = bending%inertia
+      c(1) = -w**2*integrals%m1 - 2.0_wp*w*dot_product(bending%first, rate)
+      c(2) = -w**2*mv
+      c(3) = 2.0_wp*w*dot_product(rate, curved)
+      c(4:) = -w**2*matmul(bending%inertia, x)
+      if (elastic) c(4:) = c(4:) + matmul(bending%stiffness, x)
+   end subroutine rod_alone
+
+   !> The chain beyond, which node k moves by A + l n W' - l W^2 e and the end tangent turns by W' + beta''.
+   pure subroutine add_chain(length, bends, inertia, outer, h, c)
+      real(wp), intent(in) :: length
+      logical, intent(in) :: bends
+      real(wp), intent(in) :: inertia(3, 3), outer(3) !! P, and b with the fall of node k
+      real(wp), intent(inout) :: h(most, most), c(most)
+
+      h(1, 1) = h(1, 1) + inertia(1, 1)
+      h(1, 2) = h(1, 2) + inertia(1, 2)
+      h(2, 2) = h(2, 2) + inertia(2, 2)
+      h(:2, 3) = h(:2, 3) + inertia(:2, 3) + length*inertia(:2, 2)
+      h(3, 3) = h(3, 3) + inertia(3, 3) + length*(2.0_wp*inertia(2, 3) + length*inertia(2, 2))
+      c(1:2) = c(1:2) + outer(1:2)
+      c(3) = c(3) + outer(3) + length*outer(2)
+      if (.not. bends) return
+      h(:2, 5) = h(:2, 5) + inertia(:2, 3)
+      h(3, 5) = h(3, 5) + inertia(3, 3) + length*inertia(2, 3)
+      h(5, 5) = h(5, 5) + inertia(3, 3)
+      c(5) = c(5) + outer(3)
+   end subroutine add_chain
 
    !> x'' from its own rows, and P, b at the inner end without it.
    pure subroutine eliminate_bending(nb, h, c, pass, inertia, bias, smallest)
@@ -236,7 +255,7 @@ contains
    end subroutine release
 
    !> From the axes of rod k to those of rod k - 1.
-   pure subroutine turn_inward(cd, sd, inertia, bias)
+   pure subroutine turn_axes(cd, sd, inertia, bias)
       real(wp), intent(in) :: cd, sd
       real(wp), intent(inout) :: inertia(3, 3), bias(3)
       real(wp) :: ee, en, nn
@@ -251,7 +270,7 @@ contains
       inertia(1:2, 3) = [cd*inertia(1, 3) - sd*inertia(2, 3), sd*inertia(1, 3) + cd*inertia(2, 3)]
       inertia(3, 1:2) = inertia(1:2, 3)
       bias(1:2) = [cd*bias(1) - sd*bias(2), sd*bias(1) + cd*bias(2)]
-   end subroutine turn_inward
+   end subroutine turn_axes
 
    !> The spacecraft under its loads and the chain. With r = (x0, y0), rr = (-y0, x0), hinge 0 accelerates by
    !> A_C + rr w' - r w^2, A_C = (Vx' - w Vy, Vy' + w Vx), and tau = w' (sigma_0 is in the bias).
@@ -295,7 +314,7 @@ contains
    end subroutine move_spacecraft
 
    !> Outward: accelerations of the rods, moments of locked hinges.
-   pure subroutine move_rods(recursion, scene, locked, opening_acceleration, node, moment, acceleration)
+   pure subroutine outward_pass(recursion, scene, locked, opening_acceleration, node, moment, acceleration)
       type(joint_recursion), intent(in) :: recursion
       type(scene_type), intent(in) :: scene
       logical, intent(in) :: locked(0:)
@@ -330,6 +349,6 @@ contains
             node(2) = node(2) + length*w_rate
          end associate
       end do
-   end subroutine move_rods
+   end subroutine outward_pass
 
 end module rodyn_recursion_joints

@@ -4,7 +4,7 @@
 !> node, the chain from rod k outward is  f = a Ae e + b  with one axial apparent mass
 !>     a = mu (mu + a_out)/(mu + a_out sin^2(delta)),
 !> delta the angle from rod k to rod k + 1 and mu the mass between them: no differences, no loss of digits. In vector lanes:
-!> `rodyn_lane_recursion_rigid`, which has the same limit.
+!> `rodyn_lane_recursion_rigid`, which has the same limit. The same equations elsewhere: docs/model.md sec. 7.
 module rodyn_recursion_lumped
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp

@@ -1,7 +1,7 @@
 !> Accelerations of a chain of rigid rods with distributed mass in O(n): docs/model.md sec. 4.2 without alpha, beta.
 !>
 !> The recursion of `rodyn_recursion_flexible` with v = 0; see there for the notation and for why the products
-!> are multiplied out. In vector lanes: `rodyn_lane_recursion_rigid`.
+!> are multiplied out. The same equations elsewhere: docs/model.md sec. 7.
 module rodyn_recursion_rigid
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp

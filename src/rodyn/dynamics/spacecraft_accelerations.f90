@@ -1,5 +1,4 @@
-!> The spacecraft that carries a chain, docs/model.md sec. 3 and 4.2. The same equations: `rodyn_lane_spacecraft`;
-!> `rodyn_recursion_joints` (`move_spacecraft`), where the chain passes moments that are not known.
+!> The spacecraft that carries a chain, docs/model.md sec. 3 and 4.2. The same equations elsewhere: docs/model.md sec. 7.
 module rodyn_spacecraft_accelerations
    use rodyn_kinds, only: wp
    use rodyn_outboard_chain, only: outboard_chain
