@@ -1,12 +1,11 @@
 !> What is accepted gives the right case; cases survive printing and reading; documents can be edited.
 module test_case_reader
    use rodyn_kinds, only: wp
-   use rodyn_case_config, only: case_config
+   use rodyn_case_config, only: case_config, case_schema
    use rodyn_case_reader, only: case_from_document, default_case, namelist_document, parse_case, parse_document, &
       read_case, resolved_case, set_value
-   use rodyn_case_schema, only: case_groups, case_rows
    use rodyn_errors, only: error_type, exit_bad_input
-   use rodyn_schema, only: group_index
+   use rodyn_schema, only: schema_group, schema_row, group_index
    use test_case_support, only: chain, expect_accepted, nl, spacecraft, valid
    use test_testing, only: check, check_close, new_test, unittest
    implicit none (type, external)
@@ -163,21 +162,27 @@ contains
    subroutine default_is_complete(error)
       type(error_type), allocatable, intent(out) :: error
       character(len=:), allocatable :: text
+      type(schema_group), allocatable :: groups(:)
+      type(schema_row), allocatable :: rows(:)
       integer :: r
       text = default_case()
-      do r = 1, size(case_rows)
-         call check(error, index(text, '   '//trim(case_rows(r)%key)//' =') > 0 .or. &
-            index(text, '   ! '//trim(case_rows(r)%key)//' =') > 0, trim(case_rows(r)%key)//' is missing')
+      call case_schema(groups, rows)
+      do r = 1, size(rows)
+         call check(error, index(text, '   '//trim(rows(r)%key)//' =') > 0 .or. &
+            index(text, '   ! '//trim(rows(r)%key)//' =') > 0, trim(rows(r)%key)//' is missing')
          if (allocated(error)) return
       end do
    end subroutine default_is_complete
 
    subroutine rows_are_sound(error)
       type(error_type), allocatable, intent(out) :: error
+      type(schema_group), allocatable :: groups(:)
+      type(schema_row), allocatable :: rows(:)
       integer :: r
-      do r = 1, size(case_rows)
-         call check(error, group_index(case_groups, trim(case_rows(r)%group)) > 0 .and. &
-            len_trim(case_rows(r)%help) > 0 .and. len_trim(case_rows(r)%help) < len(case_rows(r)%help), trim(case_rows(r)%key))
+      call case_schema(groups, rows)
+      do r = 1, size(rows)
+         call check(error, group_index(groups, trim(rows(r)%group)) > 0 .and. &
+            len_trim(rows(r)%help) > 0 .and. len_trim(rows(r)%help) < len(rows(r)%help), trim(rows(r)%key))
          if (allocated(error)) return
       end do
    end subroutine rows_are_sound

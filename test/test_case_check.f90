@@ -7,10 +7,9 @@ module test_case_check
    use rodyn_case_config, only: case_config, hinge_config, kink_config, load_config, profile_config
    use rodyn_case_check, only: sound_case
    use rodyn_case_reader, only: parse_case, resolved_case
-   use rodyn_case_values, only: plain_text
    use rodyn_motion, only: motion_type, new_motion, initial_state
    use rodyn_scene, only: scene_type, new_scene
-   use rodyn_text, only: lower
+   use rodyn_text, only: lower, plain_text
    use test_case_support, only: nl, valid
    use test_testing, only: unittest, new_test, check, check_close
    implicit none (type, external)

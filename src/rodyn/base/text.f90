@@ -5,7 +5,7 @@ module rodyn_text
    implicit none (type, external)
    private
    public :: lower, is_name, is_digit
-   public :: to_text, formatted, tidy, short_text, time_text, quoted, printable, as_utf8, ends_with
+   public :: to_text, formatted, tidy, plain_text, short_text, time_text, quoted, printable, as_utf8, ends_with
    public :: edit_distance, word_count, has_word, word
 
    !> A number as the shortest text (integer), or with 17 significant digits (real), or as T or F.
@@ -237,6 +237,43 @@ contains
       if (number(last:last) == '.') last = last - 1
       text = number(:last)//number(exponent:)
    end function tidy
+
+   !> A number by as few digits as give it back.
+   pure function plain_text(x) result(text)
+      real(wp), intent(in) :: x
+      character(len=:), allocatable :: text, digits
+      character(len=32) :: buffer
+      character(len=12) :: format
+      real(wp) :: back
+      integer :: exponent, n, mark
+
+      text = 'NaN'
+      if (x > huge(x)) text = 'Infinity'
+      if (x < -huge(x)) text = '-Infinity'
+      if (.not. abs(x) <= huge(x)) return
+      do n = 0, 16
+         write (format, '(a, i0, a)') '(es28.', n, 'e4)'
+         write (buffer, format) abs(x)
+         read (buffer, *) back
+         if (.not. abs(back - abs(x)) > 0.0_wp) exit
+      end do
+      buffer = adjustl(buffer)
+      mark = scan(buffer, 'E')
+      read (buffer(mark + 1:), *) exponent
+      digits = buffer(1:1)//buffer(3:mark - 1)
+      if (exponent < -3 .or. exponent > 6) then
+         text = buffer(1:1)
+         if (n > 0) text = buffer(:mark - 1)
+         text = text//'e'//to_text(exponent)
+      else if (exponent < 0) then
+         text = '0.'//repeat('0', -exponent - 1)//digits
+      else if (n <= exponent) then
+         text = digits//repeat('0', exponent - n)
+      else
+         text = digits(:exponent + 1)//'.'//digits(exponent + 2:)
+      end if
+      if (x < 0.0_wp) text = '-'//text
+   end function plain_text
 
    !> A time for a message: ten digits, no idle zeros.
    pure function time_text(t) result(text)

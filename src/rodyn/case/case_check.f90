@@ -1,20 +1,19 @@
-!> A case made in memory, held against the rules that a case file is held against: the table (`rodyn_case_schema`) and
+!> A case made in memory, held against the rules that a case file is held against: those of its keys (`rodyn_case_config`) and
 !> what ties keys together (`rodyn_case_rules`), in the same words. What is left out gets its default as in a file:
 !> arrays that are not allocated, and whatever still has the initial value of its type.
 module rodyn_case_check
    use rodyn_kinds, only: wp
-   use rodyn_case_config, only: case_config, hinge_config, kink_config, load_config, model_config, profile_config, name_length, &
-      none_given
-   use rodyn_case_fields, only: visit_case
+   use rodyn_case_config, only: case_config, hinge_config, kink_config, load_config, model_config, profile_config, case_extents, &
+      none_given, visit_case
    use rodyn_case_rules, only: check_case
-   use rodyn_case_schema, only: case_extents, case_rows
-   use rodyn_case_values, only: list_text, plain_text, value_shown
+   use rodyn_case_values, only: list_text, value_shown
    use rodyn_errors, only: error_type
    use rodyn_faults, only: fault_list
    use rodyn_field_visitor, only: field_visitor
    use rodyn_key_judge, only: key_judge
-   use rodyn_schema, only: any_list, matching_word, requirement, row_index, rule_text, satisfies, schema_extent, up_to, count_rule
-   use rodyn_text, only: has_word, printable, quoted, to_text, word
+   use rodyn_schema, only: schema_extent, schema_group, schema_row, name_length, any_list, count_rule, matching_word, rule_text, &
+      satisfies, up_to
+   use rodyn_text, only: has_word, plain_text, printable, quoted, to_text, word
    use rodyn_time_law, only: keys_of_law
    implicit none (type, external)
    private
@@ -39,16 +38,14 @@ module rodyn_case_check
       procedure :: blame
    end type case_judge
 
-   !> Holds each value against its row of the table.
+   !> Holds each value against the rule of its key.
    type, extends(field_visitor) :: value_checker
       type(case_judge), pointer :: judge => null()
       type(schema_extent) :: extents(3)
       character(len=16) :: group = ''
       integer :: instance = 1
-      integer :: row = 0 !! the row visited last; rows are visited in the order of the table
    contains
       procedure :: open_group
-      procedure :: close_group
       procedure :: real_field
       procedure :: array_field
       procedure :: integer_field
@@ -73,19 +70,12 @@ contains
       type(case_config), target :: spelt !! what was given, its words as in the table
       type(case_judge), target :: judge
       type(value_checker) :: checker
-      integer :: n
 
       config = given
-      if (.not. allocated(config%profiles)) allocate (config%profiles(0))
-      if (.not. allocated(config%loads)) allocate (config%loads(0))
-      if (.not. allocated(config%kink_programs)) allocate (config%kink_programs(0))
-      if (.not. allocated(config%hinges)) allocate (config%hinges(0))
       judge%given => given
       judge%config => config
       checker%judge => judge
-      n = config%chain%n_rods
-      if (.not. satisfies(case_rows(row_index(case_rows, 'chain', 'n_rods')), real(n, wp))) n = 0
-      checker%extents = case_extents(n)
+      checker%extents = case_extents(config%chain%n_rods)
       call visit_case(checker, config)
       spelt = config
       judge%given => spelt
@@ -298,139 +288,105 @@ contains
    end function name_of
 
    !> Note a fault of a value itself.
-   subroutine reject(self, where, value, rule)
+   subroutine reject(self, row, where, value, rule)
       class(value_checker), intent(inout) :: self
+      type(schema_row), intent(in) :: row
       character(len=*), intent(in) :: where !! index in parentheses, or nothing
       character(len=*), intent(in) :: value !! ' = value', or nothing
       character(len=*), intent(in) :: rule
 
-      associate (judge => self%judge, key => case_rows(self%row)%key)
-         call judge%faults%add(0, name_of(self%group, self%instance)//' '//trim(key)//where//value//': '//rule)
+      associate (judge => self%judge)
+         call judge%faults%add(0, name_of(self%group, self%instance)//' '//trim(row%key)//where//value//': '//rule)
          if (.not. allocated(judge%unsound)) allocate (judge%unsound(0))
-         if (judge%is_sound(trim(self%group), self%instance, trim(key))) &
-            judge%unsound = [judge%unsound, unsound_key(self%group, key, self%instance)]
+         if (judge%is_sound(trim(self%group), self%instance, trim(row%key))) &
+            judge%unsound = [judge%unsound, unsound_key(self%group, row%key, self%instance)]
       end associate
    end subroutine reject
 
    subroutine open_group(self, group, instance)
       class(value_checker), intent(inout) :: self
-      character(len=*), intent(in) :: group
+      type(schema_group), intent(in) :: group
       integer, intent(in) :: instance
-      integer :: r
-
-      self%group = group
+      self%group = group%name
       self%instance = instance
-      r = max(1, self%row) ! of the same group, if there are several, or of one before it
-      do
-         if (case_rows(r)%group(1:1) == group(1:1)) then ! cheap, and false of most
-            if (case_rows(r)%group == group) exit
-         end if
-         r = r + 1
-      end do
-      do while (r > 1)
-         if (case_rows(r - 1)%group /= group) exit
-         r = r - 1
-      end do
-      self%row = r - 1
    end subroutine open_group
-
-   subroutine close_group(self)
-      class(value_checker), intent(inout) :: self
-      associate (unused => self); end associate
-   end subroutine close_group
-
-   !> Go to the row of a key.
-   subroutine find(self, key)
-      class(value_checker), intent(inout) :: self
-      character(len=*), intent(in) :: key
-      self%row = self%row + 1
-      do while (case_rows(self%row)%key /= key)
-         self%row = self%row + 1
-      end do
-   end subroutine find
 
    !> The rule that a number breaks, in words; empty if it breaks none.
    pure function broken_rule(row, x) result(rule)
-      integer, intent(in) :: row
+      type(schema_row), intent(in) :: row
       real(wp), intent(in) :: x
       character(len=:), allocatable :: rule
       rule = ''
       if (.not. abs(x) <= huge(x)) then
          rule = 'must be finite'
-      else if (.not. satisfies(case_rows(row), x)) then
-         rule = rule_text(case_rows(row))
+      else if (.not. satisfies(row, x)) then
+         rule = rule_text(row)
       end if
    end function broken_rule
 
    !> May a number be passed over, because it keeps its rule or was not given?
    pure logical function passes(row, x)
-      integer, intent(in) :: row
+      type(schema_row), intent(in) :: row
       real(wp), intent(in) :: x
       passes = .false.
-      if (abs(x) <= huge(x)) passes = satisfies(case_rows(row), x)
-      if (.not. passes) passes = case_rows(row)%default == 'depends' .and. is_unset(x)
+      if (abs(x) <= huge(x)) passes = satisfies(row, x)
+      if (.not. passes) passes = row%default == 'depends' .and. is_unset(x)
    end function passes
 
-   subroutine real_field(self, key, x)
+   subroutine real_field(self, x, row)
       class(value_checker), intent(inout) :: self
-      character(len=*), intent(in) :: key
       real(wp), intent(inout) :: x
-      call find(self, key)
-      if (.not. passes(self%row, x)) call reject(self, '', ' = '//plain_text(x), broken_rule(self%row, x))
+      type(schema_row), intent(in) :: row
+      if (.not. passes(row, x)) call reject(self, row, '', ' = '//plain_text(x), broken_rule(row, x))
    end subroutine real_field
 
-   subroutine integer_field(self, key, x)
+   subroutine integer_field(self, x, row)
       class(value_checker), intent(inout) :: self
-      character(len=*), intent(in) :: key
       integer, intent(inout) :: x
+      type(schema_row), intent(in) :: row
 
-      call find(self, key)
-      if (satisfies(case_rows(self%row), real(x, wp))) return
-      if (case_rows(self%row)%default == 'depends' .and. .not. self%judge%is_given(self%group, self%instance, key)) return
-      call reject(self, '', ' = '//to_text(x), rule_text(case_rows(self%row)))
+      if (satisfies(row, real(x, wp))) return
+      if (row%default == 'depends' .and. .not. self%judge%is_given(trim(self%group), self%instance, trim(row%key))) return
+      call reject(self, row, '', ' = '//to_text(x), rule_text(row))
    end subroutine integer_field
 
    !> An array is as long as what it runs over, and begins there: it may come with other bounds. Each stretch of equal wrong
    !> values is one fault.
-   subroutine array_field(self, key, x)
+   subroutine array_field(self, x, row)
       class(value_checker), intent(inout) :: self
-      character(len=*), intent(in) :: key
       real(wp), allocatable, intent(inout) :: x(:)
+      type(schema_row), intent(in) :: row
       integer :: lower
 
-      call find(self, key)
-      associate (row => case_rows(self%row))
-         lower = 1
-         if (row%extent /= any_list) lower = self%extents(row%extent)%lower
-         if (has_values(x) .and. row%extent /= any_list) then
-            if (all(is_unset(x))) then ! stiffnesses of rigid rods
-               if (row%default == 'depends') deallocate (x)
-            end if
-         end if
-         if (.not. has_values(x)) then
-            call leave_out(self, x)
-            return
-         end if
-         if (lbound(x, 1) /= lower) call shift(x, lower)
-         if (row%extent /= any_list) then
-            associate (wanted => self%extents(row%extent)%count)
-               if (wanted > 0 .and. size(x) /= wanted) then
-                  if (size(x) == 1) then ! in a file it would stand for all
-                     call reject(self, '', ' = '//list_text(x, .true.), 'must be allocated to '//to_text(wanted)//' values')
-                  else
-                     call reject(self, '', ' = '//list_text(x, .true.), &
-                                 count_rule(self%extents(row%extent), wanted)//', not '//to_text(size(x)))
-                  end if
-                  return
+      lower = 1
+      if (row%extent /= any_list) lower = self%extents(row%extent)%lower
+      if (has_values(x) .and. row%extent /= any_list .and. row%default == 'depends') then
+         if (all(is_unset(x))) deallocate (x) ! stiffnesses of rigid rods
+      end if
+      if (.not. has_values(x)) then
+         call leave_out(self, row, x)
+         return
+      end if
+      if (lbound(x, 1) /= lower) call shift(x, lower)
+      if (row%extent /= any_list) then
+         associate (wanted => self%extents(row%extent)%count)
+            if (wanted > 0 .and. size(x) /= wanted) then
+               if (size(x) == 1) then ! in a file it would stand for all
+                  call reject(self, row, '', ' = '//list_text(x, .true.), 'must be allocated to '//to_text(wanted)//' values')
+               else
+                  call reject(self, row, '', ' = '//list_text(x, .true.), &
+                              count_rule(self%extents(row%extent), wanted)//', not '//to_text(size(x)))
                end if
-            end associate
-         end if
-      end associate
-      call check_values(self, x, lower)
+               return
+            end if
+         end associate
+      end if
+      call check_values(self, row, x, lower)
    end subroutine array_field
 
-   subroutine check_values(self, x, lower)
+   subroutine check_values(self, row, x, lower)
       class(value_checker), intent(inout) :: self
+      type(schema_row), intent(in) :: row
       real(wp), intent(in) :: x(:)
       integer, intent(in) :: lower !! index of the first
       character(len=:), allocatable :: where
@@ -447,7 +403,7 @@ contains
          end do
          where = '('//to_text(lower + first - 1)//')'
          if (last - first + 1 == size(x)) where = '' ! all of them
-         call reject(self, where, ' = '//plain_text(x(first)), broken_rule(self%row, x(first)))
+         call reject(self, row, where, ' = '//plain_text(x(first)), broken_rule(row, x(first)))
       end do
 
    contains
@@ -455,35 +411,31 @@ contains
       pure logical function passes_rule(value)
          real(wp), intent(in) :: value
          passes_rule = .false.
-         if (abs(value) <= huge(value)) passes_rule = satisfies(case_rows(self%row), value)
+         if (abs(value) <= huge(value)) passes_rule = satisfies(row, value)
       end function passes_rule
 
    end subroutine check_values
 
    !> The default of an array that was left out, if there is one.
-   subroutine leave_out(self, x)
+   subroutine leave_out(self, row, x)
       class(value_checker), intent(inout) :: self
+      type(schema_row), intent(in) :: row
       real(wp), allocatable, intent(inout) :: x(:)
-      real(wp) :: default
 
       if (allocated(x)) deallocate (x)
-      associate (row => case_rows(self%row))
-         if (row%extent == any_list) then
-            allocate (x(0))
-         else if (row%default == 'required') then
-            call reject(self, '', '', 'is required')
-         else
-            default = 0.0_wp
-            if (row%default /= '0.0' .and. row%default /= 'depends') read (row%default, *) default
-            associate (range => self%extents(row%extent))
-               if (row%default == 'depends') then
-                  allocate (x(range%lower:range%lower - 1))
-               else
-                  allocate (x(range%lower:range%lower + range%count - 1), source=default)
-               end if
-            end associate
-         end if
-      end associate
+      if (row%extent == any_list) then
+         allocate (x(0))
+      else if (row%default == 'required') then
+         call reject(self, row, '', '', 'is required')
+      else
+         associate (range => self%extents(row%extent))
+            if (row%default == 'depends') then
+               allocate (x(range%lower:range%lower - 1))
+            else
+               allocate (x(range%lower:range%lower + range%count - 1), source=0.0_wp)
+            end if
+         end associate
+      end if
    end subroutine leave_out
 
    !> Another first index.
@@ -496,43 +448,38 @@ contains
       call move_alloc(copy, x)
    end subroutine shift
 
-   subroutine logical_field(self, key, x)
+   subroutine logical_field(self, x, row)
       class(value_checker), intent(inout) :: self
-      character(len=*), intent(in) :: key
       logical, intent(inout) :: x
-      associate (unused => x); end associate
-      call find(self, key)
+      type(schema_row), intent(in) :: row
+      associate (unused => self, unused_x => x, unused_row => row); end associate
    end subroutine logical_field
 
    !> A word takes the spelling of the table, as in a file.
-   subroutine word_field(self, key, x)
+   subroutine word_field(self, x, row)
       class(value_checker), intent(inout) :: self
-      character(len=*), intent(in) :: key
       character(len=name_length), intent(inout) :: x
+      type(schema_row), intent(in) :: row
       integer :: k
 
-      call find(self, key)
-      associate (row => case_rows(self%row))
-         if (has_word(row%words, x)) return
-         k = matching_word(row, x)
-         if (k == 0) then
-            call reject(self, '', ' = '//printable(quoted(trim(x)), 60), requirement(row))
-         else
-            x = word(row%words, k)
-         end if
-      end associate
+      if (has_word(row%words, x)) return
+      k = matching_word(row, x)
+      if (k == 0) then
+         call reject(self, row, '', ' = '//printable(quoted(trim(x)), 60), rule_text(row))
+      else
+         x = word(row%words, k)
+      end if
    end subroutine word_field
 
-   subroutine text_field(self, key, x)
+   subroutine text_field(self, x, row)
       class(value_checker), intent(inout) :: self
-      character(len=*), intent(in) :: key
       character(len=:), allocatable, intent(inout) :: x
+      type(schema_row), intent(in) :: row
 
-      call find(self, key)
       if (.not. allocated(x)) then
          x = ''
-      else if (case_rows(self%row)%rule == up_to .and. len(x) > nint(case_rows(self%row)%high)) then
-         call reject(self, '', ' = '//printable(quoted(x), 60), rule_text(case_rows(self%row)))
+      else if (row%rule == up_to .and. len(x) > nint(row%high)) then
+         call reject(self, row, '', ' = '//printable(quoted(x), 60), rule_text(row))
       end if
    end subroutine text_field
 

@@ -1,4 +1,4 @@
-!> What a table of keys is made of. One table per kind of file holds everything there is to know of its keys:
+!> What the declarations of keys are made of. One table per kind of file holds everything there is to know of its keys:
 !> validation, defaults and documentation are read off it.
 module rodyn_schema
    use rodyn_kinds, only: wp
@@ -6,11 +6,14 @@ module rodyn_schema
    implicit none (type, external)
    private
    public :: schema_group, schema_row, schema_extent
+   public :: name_length
    public :: type_integer, type_real, type_logical, type_word, type_text
    public :: one_value, any_list
    public :: no_rule, positive, not_negative, at_least, in_range, between, up_to
    public :: satisfies, matching_word, rule_text, requirement, count_rule, row_index, group_index, nearest_key, nearest_group, &
       misspelt_key, misspelt_group
+
+   integer, parameter :: name_length = 32 !! longest choice word ('distributed', 'sine_squared', ...)
 
    !> Types of a key. A word is one of a fixed list; a text is free.
    integer, parameter :: type_integer = 1, type_real = 2, type_logical = 3, type_word = 4, type_text = 5
@@ -29,20 +32,20 @@ module rodyn_schema
       character(len=100) :: help = ''
    end type schema_group
 
-   !> One key
+   !> One key, as it is declared where a visitor passes; what stands last is known to the table only (`rodyn_schema_collector`).
    type :: schema_row
-      character(len=16) :: group
       character(len=24) :: key
-      integer :: type
-      integer :: extent = one_value
       character(len=12) :: unit = ''            !! empty: a pure number or a text
-      character(len=16) :: default = 'required' !! in namelist syntax; 'required'; 'depends' (see `when`)
+      integer :: extent = one_value
       integer :: rule = no_rule
       real(wp) :: low = 0.0_wp, high = 0.0_wp   !! of the rule
+      character(len=8) :: default = ''          !! 'required'; 'depends' (see `when`); empty: the initial value of the component
       character(len=64) :: words = ''           !! of a word: 'free|fixed'
       character(len=24) :: example = ''         !! value to show where there is no default
       character(len=64) :: when = ''            !! of 'depends': when it is required, or what else it is
       character(len=100) :: help = ''
+      character(len=16) :: group = ''
+      integer :: type = 0
    end type schema_row
 
    !> What arrays run over
@@ -93,7 +96,7 @@ contains
          text = 'must not be longer than '//to_text(nint(row%high))//' bytes'
       case default
          text = ''
-         if (row%type == type_word) text = word_rule(row%words)
+         if (len_trim(row%words) > 0) text = word_rule(row%words)
       end select
       if (len(text) > 0) text = text//unit_text(row)
    end function rule_text

@@ -11,13 +11,11 @@
 !>     call case_from_document(document, config, error)
 module rodyn_case_reader
    use rodyn_case_check, only: complete_case
-   use rodyn_case_config, only: case_config
+   use rodyn_case_config, only: case_config, case_extents, case_schema, visit_blank_case, visit_case
    use rodyn_case_rules, only: check_case
-   use rodyn_case_schema, only: case_extents, case_groups, case_rows
-   use rodyn_case_fields, only: visit_case
    use rodyn_case_writer, only: resolved_case
    use rodyn_checked_document, only: checked_document, entry_of, instances, match_document
-   use rodyn_defaults_text, only: defaults_text
+   use rodyn_defaults_writer, only: defaults_writer, new_defaults_writer
    use rodyn_document_checks, only: check_document
    use rodyn_errors, only: error_type
    use rodyn_field_loader, only: field_loader
@@ -25,7 +23,7 @@ module rodyn_case_reader
    use rodyn_namelist_document, only: namelist_document, is_integer
    use rodyn_namelist_edit, only: set_value
    use rodyn_namelist_parser, only: parse_document
-   use rodyn_schema, only: row_index, satisfies
+   use rodyn_schema, only: schema_group, schema_row, row_index
    implicit none (type, external)
    private
    public :: read_case, parse_case, case_from_document
@@ -72,8 +70,11 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(checked_document), target :: checked
       type(field_loader) :: loader
+      type(schema_group), allocatable :: groups(:)
+      type(schema_row), allocatable :: rows(:)
 
-      call match_document(document, case_groups, case_rows, checked)
+      call case_schema(groups, rows)
+      call match_document(document, groups, rows, checked)
       if (.not. document%readable) then
          call checked%faults%to_error(document%name, error)
          return
@@ -98,11 +99,10 @@ contains
 
       rods_of = 0
       e = entry_of(checked, 'chain', 1, 'n_rods')
-      if (e == 0 .and. presumed) e = findloc(checked%row == row_index(case_rows, 'chain', 'n_rods'), .true., 1)
+      if (e == 0 .and. presumed) e = findloc(checked%row == row_index(checked%rows, 'chain', 'n_rods'), .true., 1)
       if (e == 0) return
       associate (entry => checked%document%entries(e), values => checked%document%values)
          if (entry%first /= entry%last .or. values(entry%first)%kind /= is_integer) return
-         if (.not. satisfies(case_rows(row_index(case_rows, 'chain', 'n_rods')), values(entry%first)%x)) return
          rods_of = values(entry%first)%number
       end associate
    end function rods_of
@@ -110,7 +110,11 @@ contains
    !> A complete commented case that runs as it is.
    function default_case() result(text)
       character(len=:), allocatable :: text
-      text = defaults_text(case_groups, case_rows, case_extents(0), heading)
+      type(defaults_writer) :: writer
+
+      call new_defaults_writer(writer, case_extents(0), heading)
+      call visit_blank_case(writer)
+      text = writer%text%content()
    end function default_case
 
 end module rodyn_case_reader

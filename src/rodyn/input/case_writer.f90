@@ -1,11 +1,9 @@
 !> Prints a case as a namelist with every key and the value used. Reading it back gives the same case.
 module rodyn_case_writer
    use rodyn_kinds, only: wp
-   use rodyn_case_config, only: case_config, name_length
-   use rodyn_case_schema, only: case_rows
-   use rodyn_case_fields, only: visit_case
+   use rodyn_case_config, only: case_config, visit_case
    use rodyn_field_visitor, only: field_visitor
-   use rodyn_schema, only: row_index, satisfies
+   use rodyn_schema, only: schema_group, schema_row, name_length, satisfies
    use rodyn_text, only: quoted, to_text
    use rodyn_text_buffer, only: text_buffer
    implicit none (type, external)
@@ -18,7 +16,6 @@ module rodyn_case_writer
    !> the mass of a fixed spacecraft, and is left out.
    type, extends(field_visitor) :: case_writer
       type(text_buffer) :: text
-      character(len=:), allocatable :: group
    contains
       procedure :: open_group
       procedure :: close_group
@@ -40,21 +37,16 @@ contains
       type(case_writer) :: writer
 
       copy = config ! a visitor may change what it visits; this one does not
-      if (.not. allocated(copy%loads)) allocate (copy%loads(0))
-      if (.not. allocated(copy%kink_programs)) allocate (copy%kink_programs(0))
-      if (.not. allocated(copy%hinges)) allocate (copy%hinges(0))
-      if (.not. allocated(copy%profiles)) allocate (copy%profiles(0))
       call visit_case(writer, copy)
       text = writer%text%content()
    end function resolved_case
 
    subroutine open_group(self, group, instance)
       class(case_writer), intent(inout) :: self
-      character(len=*), intent(in) :: group
+      type(schema_group), intent(in) :: group
       integer, intent(in) :: instance
-      self%group = group
-      if (instance > 1) call self%text%line('! '//group//' '//to_text(instance))
-      call self%text%line('&'//group)
+      if (instance > 1) call self%text%line('! '//trim(group%name)//' '//to_text(instance))
+      call self%text%line('&'//trim(group%name))
    end subroutine open_group
 
    subroutine close_group(self)
@@ -62,38 +54,31 @@ contains
       call self%text%line('/')
    end subroutine close_group
 
-   subroutine put(self, key, value)
+   subroutine put(self, row, value)
       class(case_writer), intent(inout) :: self
-      character(len=*), intent(in) :: key, value
-      call self%text%line('   '//key//' = '//value)
+      type(schema_row), intent(in) :: row
+      character(len=*), intent(in) :: value
+      call self%text%line('   '//trim(row%key)//' = '//value)
    end subroutine put
 
-   !> Does the number keep its rule?
-   logical function is_given(self, key, x)
-      class(case_writer), intent(in) :: self
-      character(len=*), intent(in) :: key
-      real(wp), intent(in) :: x
-      is_given = satisfies(case_rows(row_index(case_rows, self%group, key)), x)
-   end function is_given
-
-   subroutine real_field(self, key, x)
+   subroutine real_field(self, x, row)
       class(case_writer), intent(inout) :: self
-      character(len=*), intent(in) :: key
       real(wp), intent(inout) :: x
-      if (is_given(self, key, x)) call put(self, key, to_text(x))
+      type(schema_row), intent(in) :: row
+      if (satisfies(row, x)) call put(self, row, to_text(x))
    end subroutine real_field
 
    !> Runs of equal values become repeat counts.
-   subroutine array_field(self, key, x)
+   subroutine array_field(self, x, row)
       class(case_writer), intent(inout) :: self
-      character(len=*), intent(in) :: key
       real(wp), allocatable, intent(inout) :: x(:)
+      type(schema_row), intent(in) :: row
       integer :: first, last, runs
 
       if (.not. allocated(x)) return
       if (size(x) == 0) return
-      if (.not. is_given(self, key, minval(x))) return
-      call self%text%append('   '//key//' = ')
+      if (.not. satisfies(row, minval(x))) return
+      call self%text%append('   '//trim(row%key)//' = ')
       runs = 0
       first = lbound(x, 1)
       do while (first <= ubound(x, 1))
@@ -120,35 +105,35 @@ contains
       end do
    end function end_of_run
 
-   subroutine integer_field(self, key, x)
+   subroutine integer_field(self, x, row)
       class(case_writer), intent(inout) :: self
-      character(len=*), intent(in) :: key
       integer, intent(inout) :: x
-      if (is_given(self, key, real(x, wp))) call put(self, key, to_text(x))
+      type(schema_row), intent(in) :: row
+      if (satisfies(row, real(x, wp))) call put(self, row, to_text(x))
    end subroutine integer_field
 
-   subroutine logical_field(self, key, x)
+   subroutine logical_field(self, x, row)
       class(case_writer), intent(inout) :: self
-      character(len=*), intent(in) :: key
       logical, intent(inout) :: x
-      call put(self, key, to_text(x))
+      type(schema_row), intent(in) :: row
+      call put(self, row, to_text(x))
    end subroutine logical_field
 
-   subroutine word_field(self, key, x)
+   subroutine word_field(self, x, row)
       class(case_writer), intent(inout) :: self
-      character(len=*), intent(in) :: key
       character(len=name_length), intent(inout) :: x
-      call put(self, key, quoted(trim(x)))
+      type(schema_row), intent(in) :: row
+      call put(self, row, quoted(trim(x)))
    end subroutine word_field
 
-   subroutine text_field(self, key, x)
+   subroutine text_field(self, x, row)
       class(case_writer), intent(inout) :: self
-      character(len=*), intent(in) :: key
       character(len=:), allocatable, intent(inout) :: x
+      type(schema_row), intent(in) :: row
       if (allocated(x)) then
-         call put(self, key, quoted(x))
+         call put(self, row, quoted(x))
       else
-         call put(self, key, quoted(''))
+         call put(self, row, quoted(''))
       end if
    end subroutine text_field
 

@@ -1,12 +1,11 @@
-!> Fills a configuration from a checked document: defaults, then what the file says, then single elements.
+!> Fills a configuration, which comes with its defaults, from a checked document: what the file says, then single elements.
 !> It knows nothing of cases; any schema will do.
 module rodyn_field_loader
    use rodyn_kinds, only: wp
-   use rodyn_case_config, only: name_length
    use rodyn_field_visitor, only: field_visitor
    use rodyn_checked_document, only: checked_document, group_at
    use rodyn_namelist_document, only: namelist_value, string_content
-   use rodyn_schema, only: any_list, matching_word
+   use rodyn_schema, only: schema_group, schema_row, name_length, any_list, matching_word
    use rodyn_text, only: word
    implicit none (type, external)
    private
@@ -16,7 +15,7 @@ module rodyn_field_loader
    type, extends(field_visitor) :: field_loader
       type(checked_document), pointer :: checked => null()
       integer :: group = 0 !! the open group of the document; 0: not in the file
-      integer :: row = 0   !! the row visited last; rows are visited in the order of the table
+      integer :: row = 0   !! number of the row visited last; rows are visited in the order of the table
    contains
       procedure :: open_group
       procedure :: close_group
@@ -26,20 +25,20 @@ module rodyn_field_loader
       procedure :: logical_field
       procedure :: word_field
       procedure :: text_field
-      procedure :: text_list
+      procedure :: texts_field
    end type field_loader
 
 contains
 
    subroutine open_group(self, group, instance)
       class(field_loader), intent(inout) :: self
-      character(len=*), intent(in) :: group
+      type(schema_group), intent(in) :: group
       integer, intent(in) :: instance
       integer :: r
 
-      self%group = group_at(self%checked, group, instance)
+      self%group = group_at(self%checked, trim(group%name), instance)
       do r = 1, size(self%checked%rows)
-         if (self%checked%rows(r)%group == group) exit
+         if (self%checked%rows(r)%group == group%name) exit
       end do
       self%row = r - 1
    end subroutine open_group
@@ -50,12 +49,12 @@ contains
    end subroutine close_group
 
    !> Go to the row of a key, and find the last valid entry for it; 0 if there is none.
-   integer function find(self, key) result(found)
+   integer function find(self, row) result(found)
       class(field_loader), intent(inout) :: self
-      character(len=*), intent(in) :: key
+      type(schema_row), intent(in) :: row
 
       found = 0
-      do while (self%checked%rows(self%row + 1)%key /= key)
+      do while (self%checked%rows(self%row + 1)%key /= row%key)
          self%row = self%row + 1
       end do
       self%row = self%row + 1
@@ -76,59 +75,35 @@ contains
       value = self%checked%document%values(self%checked%document%entries(entry)%first)
    end function value_of
 
-   !> Does the row have a default value of its own?
-   logical function has_default(self)
-      class(field_loader), intent(in) :: self
-      associate (default => self%checked%rows(self%row)%default)
-         has_default = default /= 'required' .and. default /= 'depends'
-      end associate
-   end function has_default
-
-   subroutine set_default(self, x)
-      class(field_loader), intent(in) :: self
-      real(wp), intent(inout) :: x !! as it is if the row has no default
-      if (.not. has_default(self)) return
-      x = 0.0_wp
-      if (self%checked%rows(self%row)%default == '0.0') return
-      read (self%checked%rows(self%row)%default, *) x
-   end subroutine set_default
-
-   subroutine real_field(self, key, x)
+   subroutine real_field(self, x, row)
       class(field_loader), intent(inout) :: self
-      character(len=*), intent(in) :: key
       real(wp), intent(inout) :: x
+      type(schema_row), intent(in) :: row
       type(namelist_value) :: value
       integer :: e
 
-      e = find(self, key)
-      if (e > 0) then
-         value = value_of(self, e)
-         x = value%x
-      else
-         call set_default(self, x)
-      end if
+      e = find(self, row)
+      if (e == 0) return
+      value = value_of(self, e)
+      x = value%x
    end subroutine real_field
 
-   !> Arrays over an extent get its length; lists the length they have in the file.
-   subroutine array_field(self, key, x)
+   !> Arrays over an extent get its length, 0 by default; lists the length they have in the file.
+   subroutine array_field(self, x, row)
       class(field_loader), intent(inout) :: self
-      character(len=*), intent(in) :: key
       real(wp), allocatable, intent(inout) :: x(:)
-      real(wp) :: default
-      integer :: e, extent, last
+      type(schema_row), intent(in) :: row
+      integer :: e, last
 
-      last = find(self, key)
-      extent = self%checked%rows(self%row)%extent
+      last = find(self, row)
       if (allocated(x)) deallocate (x)
-      if (extent == any_list) then
+      if (row%extent == any_list) then
          allocate (x(list_length(self, last)))
          if (last > 0) call spread_values(self, last, x)
          return
       end if
-      default = 0.0_wp
-      call set_default(self, default)
-      associate (range => self%checked%extents(extent))
-         allocate (x(range%lower:range%lower + range%count - 1), source=default)
+      associate (range => self%checked%extents(row%extent))
+         allocate (x(range%lower:range%lower + range%count - 1), source=0.0_wp)
          if (last == 0 .or. range%count == 0) return
       end associate
       do e = self%checked%document%groups(self%group)%first, last
@@ -180,77 +155,66 @@ contains
       end associate
    end subroutine spread_values
 
-   subroutine integer_field(self, key, x)
+   subroutine integer_field(self, x, row)
       class(field_loader), intent(inout) :: self
-      character(len=*), intent(in) :: key
       integer, intent(inout) :: x
+      type(schema_row), intent(in) :: row
       type(namelist_value) :: value
       integer :: e
 
-      e = find(self, key)
-      if (e > 0) then
-         value = value_of(self, e)
-         x = value%number
-      else if (has_default(self)) then
-         read (self%checked%rows(self%row)%default, *) x
-      end if
+      e = find(self, row)
+      if (e == 0) return
+      value = value_of(self, e)
+      x = value%number
    end subroutine integer_field
 
-   subroutine logical_field(self, key, x)
+   subroutine logical_field(self, x, row)
       class(field_loader), intent(inout) :: self
-      character(len=*), intent(in) :: key
       logical, intent(inout) :: x
+      type(schema_row), intent(in) :: row
       type(namelist_value) :: value
       integer :: e
 
-      e = find(self, key)
-      if (e > 0) then
-         value = value_of(self, e)
-         x = value%truth
-      else if (has_default(self)) then
-         x = self%checked%rows(self%row)%default == '.true.'
-      end if
+      e = find(self, row)
+      if (e == 0) return
+      value = value_of(self, e)
+      x = value%truth
    end subroutine logical_field
 
    !> A word takes the spelling of the table.
-   subroutine word_field(self, key, x)
+   subroutine word_field(self, x, row)
       class(field_loader), intent(inout) :: self
-      character(len=*), intent(in) :: key
       character(len=name_length), intent(inout) :: x
+      type(schema_row), intent(in) :: row
       integer :: e
 
-      e = find(self, key)
-      associate (row => self%checked%rows(self%row))
-         if (e > 0) then
-            x = word(row%words, matching_word(row, string_content(self%checked%document, value_of(self, e))))
-         else if (has_default(self)) then
-            x = unquoted(row%default)
-         end if
-      end associate
+      e = find(self, row)
+      if (e > 0) x = word(row%words, matching_word(row, string_content(self%checked%document, value_of(self, e))))
    end subroutine word_field
 
-   subroutine text_field(self, key, x)
+   subroutine text_field(self, x, row)
       class(field_loader), intent(inout) :: self
-      character(len=*), intent(in) :: key
       character(len=:), allocatable, intent(inout) :: x
+      type(schema_row), intent(in) :: row
       integer :: e
 
-      e = find(self, key)
+      e = find(self, row)
       if (e > 0) then
          x = string_content(self%checked%document, value_of(self, e))
-      else if (has_default(self)) then
-         x = unquoted(self%checked%rows(self%row)%default)
+      else if (.not. allocated(x)) then
+         x = ''
       end if
    end subroutine text_field
 
    !> A list of texts, all as long as the longest; without values if the key is not given.
-   subroutine text_list(self, key, x)
+   subroutine texts_field(self, x, row)
       class(field_loader), intent(inout) :: self
-      character(len=*), intent(in) :: key
-      character(len=:), allocatable, intent(out) :: x(:)
+      character(len=:), allocatable, intent(inout) :: x(:)
+      type(schema_row), intent(in) :: row
       integer :: at, e, longest, v
 
-      e = find(self, key)
+      e = find(self, row)
+      if (allocated(x)) deallocate (x)
       if (e == 0) then
          allocate (character(len=1) :: x(0))
          return
@@ -264,13 +228,6 @@ contains
             at = at + values(v)%copies
          end do
       end associate
-   end subroutine text_list
-
-   !> The text between the quotes of a default.
-   pure function unquoted(default) result(text)
-      character(len=*), intent(in) :: default
-      character(len=:), allocatable :: text
-      text = default(2:len_trim(default) - 1)
-   end function unquoted
+   end subroutine texts_field
 
 end module rodyn_field_loader

@@ -179,7 +179,7 @@ contains
       type(namelist_document) :: document
       integer :: a
 
-      document = sweep%base
+      document = sweep%base_document
       do a = 1, size(sweep%axes)
          associate (axis => sweep%axes(a))
             if (is_ratio(axis) .or. row_of(axis, rows) == 0) cycle
@@ -276,8 +276,8 @@ contains
       call build_case(sweep, plan, case, config, error)
       if (.not. allocated(error)) call new_run_setup(setup, config, .false., error)
       if (allocated(error)) return
-      if (sweep%frequencies > 0) call keep_frequencies(setup%motion%dynamics%scene, config, sweep%at_equilibrium, &
-                                                       keeper%kept, error)
+      if (sweep%frequencies > 0) call keep_frequencies(setup%motion%dynamics%scene, config, &
+                                                       sweep%frequencies_at == 'equilibrium', keeper%kept, error)
       if (allocated(error) .or. .not. sweep%integrate) return
       monitor = new_monitor(sweep, pulse, clock_start, late)
       call merge_times(config, sweep%probe_times, shape%outputs, times, keeper%probe_of, keeper%output_of)

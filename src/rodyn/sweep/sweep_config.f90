@@ -6,9 +6,9 @@
 module rodyn_sweep_config
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: case_config
-   use rodyn_case_values, only: plain_text
    use rodyn_namelist_document, only: namelist_document
-   use rodyn_text, only: formatted, quoted, tidy, to_text
+   use rodyn_sweep_keys, only: sweep_keys
+   use rodyn_text, only: formatted, plain_text, quoted, tidy, to_text
    implicit none (type, external)
    private
    public :: sweep_config, sweep_axis, key_length, axis_size, shown_value, short_value_text, value_text, is_ratio
@@ -29,19 +29,12 @@ module rodyn_sweep_config
       logical, allocatable :: bad(:)                  !! values that break a rule of the key itself
    end type sweep_axis
 
-   !> A whole sweep
-   type :: sweep_config
+   !> A whole sweep: what its file says in &sweep, and what was made of the rest
+   type, extends(sweep_keys) :: sweep_config
       character(len=:), allocatable :: name, text           !! of the sweep file
       character(len=:), allocatable :: base_name, base_text !! of the case file
-      type(namelist_document) :: base                       !! parsed
+      type(namelist_document) :: base_document              !! parsed
       type(case_config) :: base_case                        !! as the base file alone has it
-      real(wp), allocatable :: probe_times(:)               !! increasing [s]
-      logical :: keep_series = .false.
-      real(wp) :: case_seconds = 0.0_wp                     !! wall time limit; 0: none
-      logical :: lanes = .true.                             !! like cases may go side by side
-      integer :: frequencies = 0                            !! natural frequencies that are kept of each case
-      logical :: at_equilibrium = .false.                   !! they are those there, not at the initial state
-      logical :: integrate = .true.                         !! otherwise nothing else is computed
       type(sweep_axis), allocatable :: axes(:)
       integer :: n_dimensions = 0
       character(len=:), allocatable :: tried                !! what was tried of the values, in words

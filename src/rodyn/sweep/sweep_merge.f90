@@ -245,7 +245,7 @@ contains
       call make('wall_seconds', [integer ::], 'real', 's', 'wall time of the case')
       if (shape%n_modes > 0) then
          state = 'at the initial state'
-         if (sweep%at_equilibrium) state = 'at the equilibrium'
+         if (sweep%frequencies_at == 'equilibrium') state = 'at the equilibrium'
          call make('frequency', [shape%n_modes], 'real', 'rad s-1', 'natural frequency '//state)
          call make('damping_ratio', [shape%n_modes], 'real', '1', 'damping ratio '//state)
       end if

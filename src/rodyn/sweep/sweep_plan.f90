@@ -198,7 +198,7 @@ contains
       call buffer%line('keep_series: '//to_text(sweep%keep_series))
       call buffer%line('lanes: '//to_text(sweep%lanes))
       if (sweep%frequencies > 0) call buffer%line('frequencies: '//to_text(sweep%frequencies))
-      if (sweep%at_equilibrium) call buffer%line('frequencies at: equilibrium')
+      if (sweep%frequencies_at == 'equilibrium') call buffer%line('frequencies at: equilibrium')
       if (.not. sweep%integrate) call buffer%line('integrate: '//to_text(sweep%integrate))
       do a = 1, size(sweep%axes)
          associate (axis => sweep%axes(a))

@@ -5,22 +5,21 @@
 !>     call new_plan(plan, sweep, error)
 module rodyn_sweep_reader
    use rodyn_kinds, only: i8, wp
-   use rodyn_case_config, only: case_config, name_length
+   use rodyn_case_config, only: case_config, case_schema
    use rodyn_case_reader, only: case_from_document
-   use rodyn_case_schema, only: case_groups, case_rows
    use rodyn_checked_document, only: checked_document, blame, entry_of, instances, is_given, is_sound, match_document
-   use rodyn_defaults_text, only: defaults_text
+   use rodyn_defaults_writer, only: defaults_writer, new_defaults_writer
    use rodyn_document_checks, only: check_document
    use rodyn_errors, only: error_type
    use rodyn_field_loader, only: field_loader
    use rodyn_namelist_document, only: namelist_document, group_count
    use rodyn_namelist_edit, only: split_key
    use rodyn_namelist_parser, only: parse_document
-   use rodyn_schema, only: schema_row, any_list, group_index, matching_word, nearest_key, nearest_group, positive, row_index, &
-      rule_text, satisfies, type_integer, type_logical, type_real, type_word
+   use rodyn_schema, only: schema_group, schema_row, any_list, group_index, matching_word, nearest_key, nearest_group, positive, &
+      row_index, rule_text, satisfies, type_integer, type_logical, type_real, type_word
    use rodyn_sweep_case, only: build_values
    use rodyn_sweep_config, only: sweep_axis, sweep_config, axis_size, is_ratio, shown_value
-   use rodyn_sweep_schema, only: sweep_extents, sweep_groups, sweep_rows
+   use rodyn_sweep_keys, only: axis_keys, sweep_keys, sweep_extents, sweep_schema, visit_axis, visit_blank_sweep, visit_sweep
    use rodyn_text, only: formatted, lower, printable, tidy, to_text
    implicit none (type, external)
    private
@@ -30,7 +29,7 @@ module rodyn_sweep_reader
    integer, parameter :: most_tried = 10000 !! rows of a dimension that are built
    integer, parameter :: most_dimensions = 60 !! of a sweep whose rows are built: of more it has too many cases in any event
    integer, parameter :: most_told = 10     !! values of an axis that are named
-   type(schema_row), parameter :: ratio_row = schema_row('', 'mass_ratio', type_real, rule=positive)
+   type(schema_row), parameter :: ratio_row = schema_row('mass_ratio', rule=positive, type=type_real)
    character(len=*), parameter :: heading = &
       '! A sweep of Rodyn: every key, with its default or an example.'//nl// &
       "! `base` is a case file; `rodyn defaults run` prints one."//nl
@@ -45,20 +44,31 @@ contains
       type(namelist_document), target :: document
       type(checked_document), target :: checked
       type(field_loader) :: loader
+      type(sweep_keys) :: given
 
-      path = ''
       call parse_document(text, '', document)
-      call match_document(document, sweep_groups, sweep_rows, checked)
-      call check_document(checked, sweep_extents)
+      call check_sweep_document(document, checked)
       loader%checked => checked
-      call loader%open_group('sweep', 1)
-      call loader%text_field('base', path)
+      call visit_sweep(loader, given)
+      path = given%base
       if (len_trim(path) == 0 .or. entry_of(checked, 'sweep', 1, 'base') == 0) then
          path = ''
       else if (index(path, '/') /= 1 .and. directory /= '.') then
          path = directory//'/'//path
       end if
    end subroutine find_base
+
+   !> Hold a document against the keys of a sweep.
+   subroutine check_sweep_document(document, checked)
+      type(namelist_document), intent(in), target :: document
+      type(checked_document), intent(out) :: checked
+      type(schema_group), allocatable :: groups(:)
+      type(schema_row), allocatable :: rows(:)
+
+      call sweep_schema(groups, rows)
+      call match_document(document, groups, rows, checked)
+      call check_document(checked, sweep_extents)
+   end subroutine check_sweep_document
 
    !> Check and complete a sweep and its base.
    subroutine parse_sweep(text, name, base_text, base_name, try_values, sweep, error, base_failure)
@@ -81,12 +91,11 @@ contains
       has_base = len(base_name) > 0
       if (present(base_failure)) has_base = has_base .and. len(base_failure) == 0
       if (has_base) then
-         call parse_document(base_text, base_name, sweep%base)
-         call case_from_document(sweep%base, sweep%base_case, base_error)
+         call parse_document(base_text, base_name, sweep%base_document)
+         call case_from_document(sweep%base_document, sweep%base_case, base_error)
       end if
       call parse_document(text, name, document)
-      call match_document(document, sweep_groups, sweep_rows, checked)
-      call check_document(checked, sweep_extents)
+      call check_sweep_document(document, checked)
       if (present(base_failure)) then
          if (len(base_failure) > 0) call blame(checked, 'sweep', 1, 'base', base_failure)
       end if
@@ -110,7 +119,11 @@ contains
    !> A complete commented sweep file.
    function default_sweep() result(text)
       character(len=:), allocatable :: text
-      text = defaults_text(sweep_groups, sweep_rows, sweep_extents, heading)
+      type(defaults_writer) :: writer
+
+      call new_defaults_writer(writer, sweep_extents, heading)
+      call visit_blank_sweep(writer)
+      text = writer%text%content()
    end function default_sweep
 
    !> Fill the configuration, and note what is wrong with several keys together.
@@ -119,29 +132,12 @@ contains
       type(sweep_config), intent(inout) :: sweep
       logical, intent(in) :: has_base, base_is_sound
       type(field_loader) :: loader
-      character(len=name_length) :: combine, at
-      character(len=:), allocatable :: path
-      character(len=*), parameter :: axis_keys(8) = [character(len=11) :: 'key', 'values', 'text_values', 'start', 'stop', &
-                                                     'count', 'spacing', 'along']
+      type(axis_keys), allocatable :: given(:)
       logical, allocatable :: sound(:)
-      integer :: i, k, n_axes, n_faults
+      integer :: i, n_axes, n_faults
 
       loader%checked => checked
-      combine = 'grid'
-      path = ''
-      call loader%open_group('sweep', 1)
-      call loader%text_field('base', path)
-      call loader%word_field('combine', combine)
-      call loader%field('probe_times', sweep%probe_times)
-      call loader%field('keep_series', sweep%keep_series)
-      call loader%field('case_seconds', sweep%case_seconds)
-      call loader%field('lanes', sweep%lanes)
-      call loader%field('frequencies', sweep%frequencies)
-      at = 'start'
-      call loader%word_field('frequencies_at', at)
-      sweep%at_equilibrium = at == 'equilibrium'
-      call loader%field('integrate', sweep%integrate)
-      call loader%close_group()
+      call visit_sweep(loader, sweep)
       if (base_is_sound .and. .not. is_given(checked, 'sweep', 1, 'probe_times')) &
          sweep%probe_times = [sweep%base_case%t_end]
       do i = 2, size(sweep%probe_times)
@@ -150,7 +146,7 @@ contains
          exit
       end do
 
-      if (sweep%at_equilibrium .and. sweep%frequencies == 0) &
+      if (sweep%frequencies_at == 'equilibrium' .and. sweep%frequencies == 0) &
          call blame(checked, 'sweep', 1, 'frequencies_at', 'goes with frequencies only')
       if (.not. sweep%integrate) then
          if (sweep%frequencies == 0) call blame(checked, 'sweep', 1, 'integrate', &
@@ -158,48 +154,43 @@ contains
          if (sweep%keep_series) call blame(checked, 'sweep', 1, 'keep_series', 'needs integrate = .true.')
       end if
       n_axes = instances(checked, 'axis')
-      allocate (sweep%axes(n_axes))
+      allocate (sweep%axes(n_axes), given(n_axes))
       if (n_axes == 0) call checked%faults%add(checked%document%n_lines, '&axis: at least one is required')
       allocate (sound(n_axes))
       do i = 1, n_axes
          n_faults = checked%faults%count()
-         call load_axis(checked, i, sweep%axes(i))
-         sound(i) = checked%faults%count() == n_faults .and. &
-                    all([(is_sound(checked, 'axis', i, trim(axis_keys(k))), k=1, size(axis_keys))])
+         call visit_axis(loader, i, given(i))
+         call load_axis(checked, i, given(i), sweep%axes(i))
+         sound(i) = checked%faults%count() == n_faults .and. all_sound(checked, i)
          if (sweep%axes(i)%key /= '') call resolve_key(checked, i, sweep, has_base, sweep%axes(i), sound(i))
       end do
       call check_ratio(checked, sweep)
-      call set_dimensions(checked, sweep, combine, sound)
+      call set_dimensions(checked, sweep, given, sound)
    end subroutine load_sweep
 
-   !> One &axis: key and values.
-   subroutine load_axis(checked, i, axis)
-      type(checked_document), intent(inout), target :: checked
+   !> Are all keys of an axis sound?
+   logical function all_sound(checked, i)
+      type(checked_document), intent(in) :: checked
       integer, intent(in) :: i !! which
+      integer :: r
+      all_sound = .true.
+      do r = 1, size(checked%rows)
+         if (checked%rows(r)%group == 'axis') all_sound = all_sound .and. is_sound(checked, 'axis', i, trim(checked%rows(r)%key))
+      end do
+   end function all_sound
+
+   !> One &axis: key and values.
+   subroutine load_axis(checked, i, keys, axis)
+      type(checked_document), intent(inout) :: checked
+      integer, intent(in) :: i !! which
+      type(axis_keys), intent(inout) :: keys !! what the file says; its values go to the axis
       type(sweep_axis), intent(inout) :: axis
-      type(field_loader) :: loader
-      character(len=name_length) :: spacing
-      character(len=:), allocatable :: key
-      real(wp) :: first, last
-      integer :: n, k
+      integer :: k
       logical :: by_values, by_texts, by_range
 
-      loader%checked => checked
-      key = ''
-      spacing = 'linear'
-      first = 0.0_wp
-      last = 0.0_wp
-      n = 0
-      call loader%open_group('axis', i)
-      call loader%text_field('key', key)
-      call loader%field('values', axis%numbers)
-      call loader%text_list('text_values', axis%texts)
-      call loader%field('start', first)
-      call loader%field('stop', last)
-      call loader%field('count', n)
-      call loader%word_field('spacing', spacing)
-      call loader%close_group()
-      axis%key = squeezed(key)
+      call move_alloc(keys%values, axis%numbers)
+      call move_alloc(keys%text_values, axis%texts)
+      axis%key = squeezed(keys%key)
       if (axis%key == '' .and. entry_of(checked, 'axis', i, 'key') > 0) &
          call blame(checked, 'axis', i, 'key', 'must not be empty')
 
@@ -216,16 +207,16 @@ contains
          end do
          if (.not. all([is_sound(checked, 'axis', i, 'start'), is_sound(checked, 'axis', i, 'stop'), &
                         is_sound(checked, 'axis', i, 'count'), is_sound(checked, 'axis', i, 'spacing')])) return
-         if (n < 1) return ! `count` is missing, which was told above
-         if (spacing == 'log' .and. .not. (first > 0.0_wp .and. last > 0.0_wp)) then
+         if (keys%count < 1) return ! `count` is missing, which was told above
+         if (keys%spacing == 'log' .and. .not. (keys%start > 0.0_wp .and. keys%stop > 0.0_wp)) then
             call blame(checked, 'axis', i, 'spacing', 'needs positive start and stop')
-         else if (n == 1 .and. abs(last - first) > 0.0_wp) then
+         else if (keys%count == 1 .and. abs(keys%stop - keys%start) > 0.0_wp) then
             call blame(checked, 'axis', i, 'count', 'one value cannot be both start and stop')
          else
-            axis%numbers = spaced(first, last, n, spacing == 'log')
+            axis%numbers = spaced(keys%start, keys%stop, keys%count, keys%spacing == 'log')
          end if
       end if
-      if (spacing == 'log' .and. .not. by_range) &
+      if (keys%spacing == 'log' .and. .not. by_range) &
          call blame(checked, 'axis', i, 'spacing', 'goes with start, stop and count only')
 
    contains
@@ -284,6 +275,8 @@ contains
       logical, intent(inout) :: sound !! false: the axis cannot be built from
       type(error_type), allocatable :: error
       character(len=:), allocatable :: group, name
+      type(schema_group), allocatable :: groups(:)
+      type(schema_row), allocatable :: rows(:)
       integer :: instance, paren, r
       logical :: ok
 
@@ -300,13 +293,14 @@ contains
       end if
       paren = index(name, '(')
       if (paren > 0) name = name(:paren - 1)
-      r = row_index(case_rows, group, name)
+      call case_schema(groups, rows)
+      r = row_index(rows, group, name)
       if (r == 0) then
-         if (.not. any(case_rows%group == group)) then
+         if (.not. any(groups%name == group)) then
             call refuse('key', 'a case has no group '//printable(group, 40)//'; the nearest one is '// &
-                        nearest_group(case_groups, group))
+                        nearest_group(groups, group))
          else
-            call refuse('key', '&'//group//' has no such key; the nearest one is '//nearest_key(case_rows, group, name))
+            call refuse('key', '&'//group//' has no such key; the nearest one is '//nearest_key(rows, group, name))
          end if
          return
       end if
@@ -315,13 +309,14 @@ contains
          return
       end if
       ok = .true.
-      if (has_base) call check_instance(checked, i, group, instance, name, group_count(sweep%base, group), ok)
+      if (has_base) call check_instance(checked, i, group, instance, name, group_count(sweep%base_document, group), &
+                                           groups(group_index(groups, group))%repeatable, ok)
       sound = sound .and. ok
-      axis%unit = case_rows(r)%unit
-      axis%in_list = case_rows(r)%extent == any_list
-      axis%whole = case_rows(r)%type == type_integer
-      axis%bare = case_rows(r)%type == type_logical
-      select case (case_rows(r)%type)
+      axis%unit = rows(r)%unit
+      axis%in_list = rows(r)%extent == any_list
+      axis%whole = rows(r)%type == type_integer
+      axis%bare = rows(r)%type == type_logical
+      select case (rows(r)%type)
       case (type_integer, type_real)
          if (axis%textual) call refuse('text_values', trim(axis%key)//' takes numbers')
       case default
@@ -329,7 +324,7 @@ contains
       end select
       if (.not. sound) return
       if (axis%whole .and. entry_of(checked, 'axis', i, 'values') == 0) axis%numbers = anint(axis%numbers)
-      call check_values(checked, i, case_rows(r), axis)
+      call check_values(checked, i, rows(r), axis)
 
    contains
 
@@ -394,19 +389,20 @@ contains
    end function is_whole
 
    !> Is it clear which group of the base is meant? Those that may stand several times count from 1, in the order of the file.
-   subroutine check_instance(checked, i, group, instance, name, n, ok)
+   subroutine check_instance(checked, i, group, instance, name, n, repeatable, ok)
       type(checked_document), intent(inout) :: checked
       integer, intent(in) :: i                !! axis
       character(len=*), intent(in) :: group, name
       integer, intent(in) :: instance         !! 0: none was given
       integer, intent(in) :: n                !! groups of that name in the base
+      logical, intent(in) :: repeatable       !! it may stand several times
       logical, intent(out) :: ok
       character(len=:), allocatable :: has
 
       ok = .true.
       has = 'the base has '//to_text(n)//' groups &'//group
       if (n == 1) has = 'the base has one group &'//group
-      if (.not. case_groups(group_index(case_groups, group))%repeatable) then
+      if (.not. repeatable) then
          ok = instance == 0
          if (.not. ok) call blame(checked, 'axis', i, 'key', '&'//group//' stands once and takes no number: '//group//'.'//name)
       else if (n == 0) then
@@ -452,29 +448,22 @@ contains
    end subroutine check_ratio
 
    !> Which axes advance together. Those at fault have no dimension; without them the others can still be tried.
-   subroutine set_dimensions(checked, sweep, combine, sound)
-      type(checked_document), intent(inout), target :: checked
+   subroutine set_dimensions(checked, sweep, keys, sound)
+      type(checked_document), intent(inout) :: checked
       type(sweep_config), intent(inout) :: sweep
-      character(len=*), intent(in) :: combine
-      logical, intent(in) :: sound(:) !! (axes)
-      type(field_loader) :: loader
-      character(len=:), allocatable :: along
+      type(axis_keys), intent(in) :: keys(:) !! what the file says (axes)
+      logical, intent(in) :: sound(:)        !! (axes)
       integer :: i, k, partner
 
-      loader%checked => checked
       sweep%n_dimensions = 0
       do i = 1, size(sweep%axes)
-         along = ''
-         call loader%open_group('axis', i)
-         call loader%text_field('along', along)
-         call loader%close_group()
          partner = 0
-         if (len_trim(along) > 0) then
+         if (len_trim(keys(i)%along) > 0) then
             do k = 1, i - 1
-               if (sweep%axes(k)%key == squeezed(along)) partner = k
+               if (sweep%axes(k)%key == squeezed(keys(i)%along)) partner = k
             end do
             if (partner == 0) call blame(checked, 'axis', i, 'along', 'no axis above has this key')
-         else if (combine == 'zip') then
+         else if (sweep%combine == 'zip') then
             partner = findloc(sweep%axes(:i - 1)%dimension > 0, .true., 1)
          end if
          if (.not. sound(i)) cycle
