@@ -60,7 +60,7 @@ contains
       if (.not. allocated(error)) call new_dynamics(dynamics, scene, error)
       if (allocated(error)) error stop error%message
       call dynamics%set_locked(spread(.true., 1, n), spread(0.0_wp, 1, n))
-      call natural_frequencies(dynamics%scene, spread(0.0_wp, 1, scene%n_dof), frequency, error)
+      call natural_frequencies(dynamics%scene, dynamics%hinges, spread(0.0_wp, 1, scene%n_dof), frequency, error)
       if (allocated(error)) error stop error%message
    end subroutine find_frequencies
 

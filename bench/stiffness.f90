@@ -97,7 +97,7 @@ contains
                              maxval(abs(y(a + 1:a + n) - reference(a + 1:a + n)))/scale_rate, &
                              real(stats%n_steps, wp), real(stats%n_rhs, wp), real(stats%n_jac, wp), reached/t_end, &
                              merge(1.0_wp, 0.0_wp, chosen == methods(i_method)), &
-                             effort_of(trim(bare(methods(i_method))), scene, stats), choice%effort]
+                             effort_of(trim(bare(methods(i_method))), motion%dynamics, stats), choice%effort]
                if (reached < t_end) one%values(7:8) = huge(1.0_wp)
                records = [records, one]
                write (*, '(i6, 2es9.1, 1x, a6, es9.1, f10.4, 2es10.2, 3i10, f6.3, l2, 2es9.1)') n, bending, damper, &

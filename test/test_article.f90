@@ -129,7 +129,7 @@ contains
       call read_table1(config, error)
       if (.not. allocated(error)) call new_scene(scene, config, error)
       if (allocated(error)) return
-      call natural_frequencies(scene, spread(0.0_wp, 1, scene%n_dof), frequency, error)
+      call natural_frequencies(scene, scene%hinges, spread(0.0_wp, 1, scene%n_dof), frequency, error)
       if (allocated(error)) return
       call check_close(error, frequency(1:3), [0.0_wp, 0.0_wp, 0.0_wp], 1.0e-3_wp, 'rigid-body frequencies')
       if (allocated(error)) return

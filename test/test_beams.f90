@@ -84,7 +84,7 @@ contains
       if (.not. allocated(error)) call new_dynamics(dynamics, scene, error)
       if (allocated(error)) return
       call dynamics%set_locked(spread(.true., 1, n), spread(0.0_wp, 1, n))
-      call natural_frequencies(dynamics%scene, spread(0.0_wp, 1, scene%n_dof), frequency, error)
+      call natural_frequencies(dynamics%scene, dynamics%hinges, spread(0.0_wp, 1, scene%n_dof), frequency, error)
       if (allocated(error)) return
       wrong = 0.0_wp
       modes = min(3, size(frequency))
@@ -149,7 +149,7 @@ contains
       config%chain%bending_stiffness = 1.0_wp
       config%chain%hinge_stiffness = stiffness
       call new_scene(scene, config, error)
-      if (.not. allocated(error)) call new_assembled_system(system, scene, error)
+      if (.not. allocated(error)) call new_assembled_system(system, scene, scene%hinges, error)
       if (allocated(error)) return
       m = scene%n_dof
       call mass_matrix(system, scene, [0.0_wp, spread(0.0_wp, 1, n)], [1.0_wp, spread(1.0_wp, 1, n)], spread(0.0_wp, 1, m))

@@ -236,7 +236,7 @@ contains
       call prepare(run, in_sequence, error)
       if (.not. allocated(error)) call perform(run, error)
       if (allocated(error)) return
-      effort = effort_of('dop853', run%setup%motion%dynamics%scene, run%driver%statistics())
+      effort = effort_of('dop853', run%setup%motion%dynamics, run%driver%statistics())
       call check(error, run%driver%n_choices > 1 .and. run%driver%tried < 0.5_wp*effort, 'trials cost too much')
    end subroutine test_trials_after_releases
 
@@ -250,7 +250,7 @@ contains
       effort = 0.0_wp
       call prepare(run, text//"&solver method = '"//method//"' /", error)
       if (.not. allocated(error)) call perform(run, error)
-      if (.not. allocated(error)) effort = effort_of('gauss', run%setup%motion%dynamics%scene, run%driver%statistics())
+      if (.not. allocated(error)) effort = effort_of('gauss', run%setup%motion%dynamics, run%driver%statistics())
    end subroutine measure
 
    !> Ready to begin.

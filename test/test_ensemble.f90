@@ -181,7 +181,7 @@ contains
          config%chain%hinge_stiffness = config%chain%hinge_stiffness*0.1_wp
          call new_scene(scene, config, error)
          if (allocated(error)) error stop error%message
-         found = suits_lanes(scene)
+         found = suits_lanes(scene, scene%hinges)
          if (.not. found) return
          if (i == 0) first = scene
          if (.not. are_alike(first, scene)) cycle

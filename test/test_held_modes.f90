@@ -166,11 +166,11 @@ contains
       logical :: ok
 
       step = epsilon(1.0_wp)**(1.0_wp/3.0_wp)
-      associate (m => motion%n_dof, r => motion%n_q, scene => motion%dynamics%scene)
-         t = expansion_matrix(scene)
-         chain = free_coordinates(scene)
+      associate (m => motion%n_dof, r => motion%n_q, hinges => motion%dynamics%hinges)
+         t = expansion_matrix(motion%dynamics%scene, hinges)
+         chain = free_coordinates(motion%dynamics%scene, hinges)
          n_chain = size(chain)
-         joints = m + pack([(i, i=1, r - m)], .not. scene%hinges%locked(scene%hinges%relaxing))
+         joints = m + pack([(i, i=1, r - m)], .not. hinges%locked(hinges%relaxing))
          kept = [chain, joints, r + chain]
          n = size(kept)
          allocate (along(r + m, n), source=0.0_wp)

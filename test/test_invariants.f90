@@ -43,7 +43,7 @@ contains
 
       call read_case('cases/free_flight.nml', config, text, error)
       if (.not. allocated(error)) call new_scene(scene, config, error)
-      if (.not. allocated(error)) call natural_frequencies(scene, [0.0_wp, 0.0_wp, 0.0_wp, config%initial%phi, &
+      if (.not. allocated(error)) call natural_frequencies(scene, scene%hinges, [0.0_wp, 0.0_wp, 0.0_wp, config%initial%phi, &
                                                                    spread(0.0_wp, 1, 12)], frequency, error)
       if (allocated(error)) return
       call check(error, config%t_end*frequency(4)/(2.0_wp*pi) >= 100.0_wp, 'the case lasts less than 100 periods')

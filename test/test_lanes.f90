@@ -53,7 +53,7 @@ contains
          call random_case(config, which, n)
          call new_scene(scene, config, error)
          if (allocated(error)) return
-         found = suits_lanes(scene)
+         found = suits_lanes(scene, scene%hinges)
          if (.not. found) return
          if (i > 0) then
             if (.not. are_alike(scene, eight%motions(1)%dynamics%scene)) cycle
@@ -83,12 +83,12 @@ contains
       call new_motion(eight%motions(lane), scene, .false., error)
       if (allocated(error)) return
       if (lane == 1) then
-         call new_lane_scene(eight%group, scene, one_rod_each=.true.)
+         call new_lane_scene(eight%group, scene, scene%hinges, one_rod_each=.true.)
          call new_lane_work(eight%work, eight%group)
          allocate (eight%q(lanes, scene%n_dof), eight%p(lanes, scene%n_dof), eight%acceleration(lanes, scene%n_dof))
       end if
       associate (motion => eight%motions(lane), group => eight%group)
-         call put_scene(group, lane, scene)
+         call put_scene(group, lane, scene, motion%dynamics%hinges)
          call motion%dynamics%set_regime(0.0_wp, 1.0_wp)
          call initial_state(motion, config%initial, y)
          allocate (ydot(size(y)))
@@ -299,7 +299,7 @@ contains
                other%acceleration = eight%acceleration
                do lane = 1, lanes
                   to = 1 + modulo(lane - 1 + shift, lanes)
-                  call put_scene(other%group, to, eight%motions(lane)%dynamics%scene)
+                  call put_scene(other%group, to, eight%motions(lane)%dynamics%scene, eight%motions(lane)%dynamics%hinges)
                   other%group%base_force(to, :) = eight%group%base_force(lane, :)
                   other%group%node_force(to, :, :) = eight%group%node_force(lane, :, :)
                   other%q(to, :) = eight%q(lane, :)

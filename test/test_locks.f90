@@ -91,7 +91,7 @@ contains
       integer, allocatable :: pivots(:), list(:)
       integer :: i, m, c, info
 
-      call new_assembled_system(system, scene, error)
+      call new_assembled_system(system, scene, scene%hinges, error)
       if (allocated(error)) return
       associate (phi => q(scene%phi_at() + 1:scene%phi_at() + scene%n))
          call mass_matrix(system, scene, [0.0_wp, sin(phi)], [1.0_wp, cos(phi)], q)
@@ -150,14 +150,14 @@ contains
                call motion%dynamics%accelerations(0.3_wp, y(:m), y(m + 1:2*m), free, ok)
                call check(error, ok, 'no free accelerations')
                if (allocated(error)) return
-               call new_assembled_system(system, scene, error)
+               call new_assembled_system(system, scene, motion%dynamics%hinges, error)
                associate (phi => y(scene%phi_at() + 1:scene%phi_at() + n))
                   call mass_matrix(system, scene, [0.0_wp, sin(phi)], [1.0_wp, cos(phi)], y(:m))
                end associate
                call solve_multipliers(scene, y(:m), locked, matmul(system%m, free), s, a, lambda, error)
                if (allocated(error)) return
-               call hinge_moments(scene%hinges, n, scene%dynamic_bending, y(scene%n_base + 1:m), y(m + scene%n_base + 1:2*m), &
-                                  theta, expected)
+               call hinge_moments(motion%dynamics%hinges, n, scene%dynamic_bending, y(scene%n_base + 1:m), &
+                                  y(m + scene%n_base + 1:2*m), theta, expected)
                expected(:n - 1) = expected(:n - 1) - lambda
                call motion%dynamics%set_locked(locked, s)
                call motion%dynamics%accelerations(0.3_wp, y(:m), y(m + 1:2*m), b, ok)
@@ -324,11 +324,11 @@ contains
          associate (m => motion%n_dof, scene => motion%dynamics%scene)
             allocate (p(m), impulse(0:n - 1), still(0:n - 1), rate(0:n - 1))
             still = 0.0_wp
-            before = invariants(scene, y(:m), y(m + 1:2*m))
+            before = invariants(scene, motion%dynamics%hinges, y(:m), y(m + 1:2*m))
             call motion%dynamics%velocity_jump(y(:m), y(m + 1:2*m), locked, still, p, lost, impulse, ok)
             call check(error, ok .and. lost >= 0.0_wp, 'impact')
             if (allocated(error)) return
-            after = invariants(scene, y(:m), p)
+            after = invariants(scene, motion%dynamics%hinges, y(:m), p)
             scale = 1.0e-11_wp*(1.0_wp + before%kinetic)
             call check_close(error, after%momentum, before%momentum, scale, kind_name(which)//': momentum')
             if (allocated(error)) return
@@ -417,11 +417,11 @@ contains
          if (allocated(error)) return
          associate (m => motion%n_dof, scene => motion%dynamics%scene)
             allocate (a(m), p(m), impulse(0:n - 1), still(0:n - 1), source=0.0_wp)
-            before = invariants(scene, y(:m), y(m + 1:2*m))
+            before = invariants(scene, motion%dynamics%hinges, y(:m), y(m + 1:2*m))
             call motion%dynamics%velocity_jump(y(:m), y(m + 1:2*m), spread(.true., 1, n), still, p, lost, impulse, ok)
             call check(error, ok, 'no impact')
             if (allocated(error)) return
-            after = invariants(scene, y(:m), p)
+            after = invariants(scene, motion%dynamics%hinges, y(:m), p)
             call check_close(error, after%momentum, before%momentum, 1.0e-10_wp*sqrt(2.0_wp*before%kinetic*320.0_wp), 'momentum')
             if (allocated(error)) return
             call check_close(error, after%angular_momentum, before%angular_momentum, &
@@ -617,7 +617,7 @@ contains
          allocate (ydot(size(y)))
          call motion%rhs(0.05_wp, y, ydot, ok)
          moment = motion%dynamics%work%moment(1)
-         associate (scene => stiff%dynamics%scene, hinges => stiff%dynamics%scene%hinges, m => stiff%n_dof)
+         associate (scene => stiff%dynamics%scene, hinges => stiff%dynamics%hinges, m => stiff%n_dof)
             call openings(3, scene%dynamic_bending, x(scene%n_base + 1:), opening)
             call openings(3, scene%dynamic_bending, x(m + scene%n_base + 1:), still)
             call check_close(error, hinges%stiffness(1)*(opening(1) - hinges%kink(1)) + hinges%damping(1)*still(1), moment, &
@@ -781,7 +781,7 @@ contains
       call motion_of(motion, y, config, error)
       if (allocated(error)) return
       call motion%dynamics%set_locked([.false., .true., .true., .true., .true.], still)
-      call natural_frequencies(motion%dynamics%scene, y(:5), all_of_them, error)
+      call natural_frequencies(motion%dynamics%scene, motion%dynamics%hinges, y(:5), all_of_them, error)
       if (allocated(error)) return
       call check_close(error, all_of_them, [sqrt(7.0_wp)], 1.0e-13_wp, 'one rod')
       if (allocated(error)) return
@@ -795,13 +795,13 @@ contains
          if (allocated(error)) return
          y = 0.0_wp ! springs at rest: no geometric stiffness
          call motion%dynamics%set_locked([.true., .false., .false., .true., .true.], still)
-         associate (scene => motion%dynamics%scene)
-            call fastest_rates(scene, y(:scene%n_q), highest, decay)
-            call natural_frequencies(scene, y(:scene%n_q), all_of_them, error)
+         associate (scene => motion%dynamics%scene, hinges => motion%dynamics%hinges)
+            call fastest_rates(scene, hinges, y(:scene%n_q), highest, decay)
+            call natural_frequencies(scene, hinges, y(:scene%n_q), all_of_them, error)
             if (allocated(error)) return
             call check(error, abs(highest - maxval(all_of_them)) <= 0.2_wp*highest, kind_name(which)//': frequency')
             if (allocated(error)) return
-            call decay_rates(scene, y(:scene%n_q), all_of_them, error)
+            call decay_rates(scene, hinges, y(:scene%n_q), all_of_them, error)
             if (allocated(error)) return
             call check(error, abs(decay - maxval(all_of_them)) <= 0.2_wp*decay, kind_name(which)//': decay')
             if (allocated(error)) return

@@ -66,12 +66,12 @@ contains
                call new_scene(scene, config, error)
                if (allocated(error)) return
                allocate (q(scene%n_q), source=0.0_wp) ! springs at rest: no geometric stiffness
-               call fastest_rates(scene, q, frequency, decay)
+               call fastest_rates(scene, scene%hinges, q, frequency, decay)
                scenes = scenes + 1
-               call natural_frequencies(scene, q, all, error)
+               call natural_frequencies(scene, scene%hinges, q, all, error)
                if (allocated(error)) return
                if (abs(frequency - maxval(all)) > 0.2_wp*maxval(all)) missed = missed + 1
-               call decay_rates(scene, q, all, error)
+               call decay_rates(scene, scene%hinges, q, all, error)
                if (allocated(error)) return
                if (abs(decay - maxval(all)) > 0.2_wp*maxval(all) + 1.0e-12_wp) missed = missed + 1
                deallocate (q)
@@ -239,7 +239,7 @@ contains
          integrator%options%max_steps = int(stats%n_steps) + some_steps
          call integrator%advance(t_end, y, t, error)
          stats = integrator%statistics()
-         effort = effort_of(method, scene, stats)
+         effort = effort_of(method, motion%dynamics, stats)
          if (effort > most .or. (allocated(error) .and. stats%n_steps < integrator%options%max_steps)) effort = huge(1.0_wp)
          if (.not. effort < huge(1.0_wp) .or. .not. allocated(error)) exit
          deallocate (error)

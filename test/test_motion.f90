@@ -50,8 +50,8 @@ contains
          do n = 1, 5
             call random_motion(motion, y, which, n, 'recursive', error)
             if (allocated(error)) return
-            associate (scene => motion%dynamics%scene, d => motion%n_dof)
-               call new_assembled_system(system, scene, error)
+            associate (scene => motion%dynamics%scene, hinges => motion%dynamics%hinges, d => motion%n_dof)
+               call new_assembled_system(system, scene, motion%dynamics%hinges, error)
                if (allocated(error)) return
                call mass_matrix(system, scene, [0.0_wp, sin(y(scene%phi_at() + 1:scene%phi_at() + n))], &
                                 [1.0_wp, cos(y(scene%phi_at() + 1:scene%phi_at() + n))], y(:d))
@@ -62,8 +62,8 @@ contains
                      ej = 0.0_wp
                      ei(i) = 1.0_wp
                      ej(j) = 1.0_wp
-                     m(i, j) = kinetic_energy(scene, y(:d), ei + ej) - kinetic_energy(scene, y(:d), ei) - &
-                               kinetic_energy(scene, y(:d), ej)
+                     m(i, j) = kinetic_energy(scene, hinges, y(:d), ei + ej) - kinetic_energy(scene, hinges, y(:d), ei) - &
+                               kinetic_energy(scene, hinges, y(:d), ej)
                   end do
                end do
                call check(error, maxval(abs(m - system%m)) < 100*epsilon(1.0_wp)*maxval(abs(m)), &

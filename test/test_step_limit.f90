@@ -183,7 +183,7 @@ contains
          if (allocated(error)) return
          allocate (y(2*scene%n_dof), source=0.0_wp)
          y(scene%phi_at() + 1:scene%phi_at() + 3) = config%initial%phi
-         call natural_frequencies(scene, y(:scene%n_dof), frequency, error)
+         call natural_frequencies(scene, scene%hinges, y(:scene%n_dof), frequency, error)
          if (allocated(error)) return
          call all_eigenvalues(scene, y, 1.0_wp, lambda)
          call check(error, size(lambda), 2*scene%n_dof, 'eigenvalues found')
@@ -215,13 +215,13 @@ contains
             if (scene%n_q > scene%n_dof) cycle
             allocate (q(scene%n_q), source=0.0_wp)
             q(scene%phi_at() + 1:scene%phi_at() + scene%n) = config%initial%phi
-            call natural_frequencies(scene, q, frequency, error)
+            call natural_frequencies(scene, scene%hinges, q, frequency, error)
             if (allocated(error)) return
             call extreme_eigenvalues(scene, q, lambda)
             call check_from_below(abs(lambda(1, 1)), maxval(frequency), kind_name(which)//': frequency')
             if (allocated(error)) return
             if (scene%hinges%has_damping) then
-               call decay_rates(scene, q, decay, error)
+               call decay_rates(scene, scene%hinges, q, decay, error)
                if (allocated(error)) return
                call check_from_below(abs(lambda(1, 2)), maxval(decay), kind_name(which)//': decay')
                if (allocated(error)) return

@@ -279,7 +279,7 @@ contains
       call new_scene(scene, config, error)
       allocate (q(scene%n_dof), source=0.0_wp)
       q(scene%phi_at() + 1:scene%phi_at() + scene%n) = config%initial%phi
-      call natural_frequencies(scene, q, frequency, error)
+      call natural_frequencies(scene, scene%hinges, q, frequency, error)
       highest_frequency = maxval(frequency)
    end function highest_frequency
 
@@ -291,7 +291,7 @@ contains
 
       call new_scene(scene, config, error)
       allocate (q(scene%n_dof), source=0.0_wp)
-      call decay_rates(scene, q, rate, error)
+      call decay_rates(scene, scene%hinges, q, rate, error)
       fastest_decay = maxval(rate)
    end function fastest_decay
 
@@ -732,7 +732,7 @@ contains
 
       call new_scene(scene, config, error)
       allocate (q(scene%n_dof), source=0.0_wp)
-      call natural_frequencies(scene, q, frequency, error)
+      call natural_frequencies(scene, scene%hinges, q, frequency, error)
       lowest_frequency = minval(frequency, mask=frequency > 1.0e-6_wp*maxval(frequency))
    end function lowest_frequency
 

@@ -5,8 +5,8 @@ module rodyn_accelerations
    use rodyn_scene, only: scene_type
    use rodyn_workspace, only: workspace_type, new_workspace
    use rodyn_trigonometry, only: sine_cosine
-   use rodyn_hinge_law, only: hinge_moments, hinge_state, openings
-   use rodyn_loads, only: load_regime, load_forces, new_load_regime, evaluate_loads
+   use rodyn_hinge_law, only: hinge_law, hinge_moments, hinge_state, openings
+   use rodyn_loads, only: load_set, load_regime, load_forces, new_load_set, new_load_regime, evaluate_loads
    use rodyn_kink_program, only: kink_regime, new_kink_regime, evaluate_kinks
    use rodyn_user_load, only: user_load
    use rodyn_recursion_flexible, only: flexible_accelerations
@@ -26,7 +26,8 @@ module rodyn_accelerations
 
    !> A scene with its memory and the loads that act now. One per thread.
    type :: dynamics_type
-      type(scene_type) :: scene
+      type(scene_type) :: scene        !! never changes
+      type(hinge_law) :: hinges        !! laws that they have now
       type(workspace_type) :: work
       type(assembled_system) :: system !! for the assembled kernel only
       type(joint_recursion), allocatable :: joints !! for locked hinges and the bubble; allocated when first needed
@@ -64,16 +65,19 @@ contains
 
    !> Choose the kernel and allocate its memory. No loads act until `set_regime`. Hinges that are locked in the scene stay
    !> so, without motion of their own.
-   subroutine new_dynamics(dynamics, scene, error)
+   subroutine new_dynamics(dynamics, scene, error, hinges)
       type(dynamics_type), intent(out) :: dynamics
       type(scene_type), intent(in) :: scene
       type(error_type), allocatable, intent(out) :: error
+      type(hinge_law), intent(in), optional :: hinges !! as they are now; absent: as they are when a run begins
 
       dynamics%scene = scene
+      dynamics%hinges = scene%hinges
+      if (present(hinges)) dynamics%hinges = hinges
       call new_workspace(dynamics%work, scene)
       allocate (dynamics%forces%node(2, 0))
       allocate (dynamics%opening_acceleration(0:scene%n - 1), source=0.0_wp)
-      if (scene%hinges%driven) then
+      if (dynamics%hinges%driven) then
          allocate (dynamics%kink(0:scene%n - 1), dynamics%kink_rate(0:scene%n - 1), dynamics%kink_acceleration(0:scene%n - 1), &
                    source=0.0_wp)
          call new_kink_regime(dynamics%kinks, scene%kinks, 0.0_wp, 4.0_wp*tiny(1.0_wp)) ! as they are when the run begins
@@ -90,11 +94,11 @@ contains
       self%needs_moments = .true.
       if (self%scene%assembled) then
          self%path = path_assembled
-         call new_assembled_system(self%system, self%scene, error)
-         self%needs_moments = size(self%scene%hinges%relaxing) > 0 .or. self%system%moving .or. self%scene%hinges%has_locks
-         if (size(self%scene%hinges%relaxing) == 0 .and. self%system%moving .and. .not. allocated(self%zero)) &
+         call new_assembled_system(self%system, self%scene, self%hinges, error)
+         self%needs_moments = size(self%hinges%relaxing) > 0 .or. self%system%moving .or. self%hinges%has_locks
+         if (size(self%hinges%relaxing) == 0 .and. self%system%moving .and. .not. allocated(self%zero)) &
             allocate (self%zero(self%scene%n_q), source=0.0_wp)
-      else if (has_slaves(self%scene) .or. self%scene%n_bend == 3) then
+      else if (has_slaves(self%hinges) .or. self%scene%n_bend == 3) then
          self%path = path_joints
          if (.not. allocated(self%joints)) allocate (self%joints)
          call new_joint_recursion(self%joints, self%scene)
@@ -109,16 +113,26 @@ contains
    end subroutine choose_path
 
    !> Make the loads between two neighbouring switch times act, and the kinks move as they do then.
-   subroutine set_regime(self, t_from, t_to)
+   subroutine set_regime(self, t_from, t_to, loaded)
       class(dynamics_type), intent(inout) :: self
       real(wp), intent(in) :: t_from, t_to !! [s]
+      logical, intent(in), optional :: loaded !! false: without the loads of the scene
+      type(load_set) :: none
+      logical :: unloaded
 
-      call new_load_regime(self%regime, self%scene%loads, t_from, t_to, self%scene%n)
+      unloaded = .false.
+      if (present(loaded)) unloaded = .not. loaded
+      if (unloaded) then
+         call new_load_set(none)
+         call new_load_regime(self%regime, none, t_from, t_to, self%scene%n)
+      else
+         call new_load_regime(self%regime, self%scene%loads, t_from, t_to, self%scene%n)
+      end if
       if (associated(self%user)) call make_room_for_user(self)
       call evaluate_loads(self%forces, self%regime, t_from, fresh=.true.)
       self%group_is_current = .false.
       self%driven = .false.
-      if (self%scene%hinges%driven) then
+      if (self%hinges%driven) then
          call new_kink_regime(self%kinks, self%scene%kinks, t_from, t_to)
          self%driven = size(self%kinks%moving) > 0
          call self%move_kinks(t_from)
@@ -161,8 +175,8 @@ contains
       logical, intent(out) :: ok      !! false: not finite, or M not positive definite
       real(wp) :: after(size(p)), impulse(0:self%scene%n - 1)
 
-      call self%velocity_jump(q, p, self%scene%hinges%locked, self%scene%hinges%kink_rate, after, lost, impulse, ok)
-      worked = sum(impulse*self%scene%hinges%kink_rate)
+      call self%velocity_jump(q, p, self%hinges%locked, self%hinges%kink_rate, after, lost, impulse, ok)
+      worked = sum(impulse*self%hinges%kink_rate)
       p = after
    end subroutine strike
 
@@ -173,7 +187,7 @@ contains
 
       if (.not. allocated(self%kink)) return
       call evaluate_kinks(self%kinks, t, self%kink, self%kink_rate, self%kink_acceleration)
-      call self%scene%hinges%set_kinks(self%kink, self%kink_rate)
+      call self%hinges%set_kinks(self%kink, self%kink_rate)
       self%opening_acceleration(:) = self%kink_acceleration
    end subroutine move_kinks
 
@@ -186,11 +200,11 @@ contains
       real(wp) :: held_at(0:self%scene%n - 1)
       integer :: i
 
-      call self%scene%hinges%set_mechanisms()
+      call self%hinges%set_mechanisms()
       locked = .false.
       held_at = 0.0_wp
-      do i = 1, size(self%scene%hinges%mechanisms)
-         associate (mechanism => self%scene%hinges%mechanisms(i))
+      do i = 1, size(self%hinges%mechanisms)
+         associate (mechanism => self%hinges%mechanisms(i))
             locked(mechanism%hinge) = mechanism%is_constrained()
             held_at(mechanism%hinge) = mechanism%lock_angle
          end associate
@@ -216,7 +230,7 @@ contains
 
       held = opening_acceleration ! may be the component itself
       self%opening_acceleration(:) = held
-      associate (law => self%scene%hinges)
+      associate (law => self%hinges)
          if (all(locked .eqv. law%locked) .and. .not. present(theta)) return
          held = 0.0_wp
          held(law%held) = law%held_at
@@ -236,9 +250,9 @@ contains
       real(wp), intent(in) :: opening_rate(0:) !! (0:n-1) [rad/s]
       real(wp), intent(inout) :: q(:), p(:)
 
-      if (.not. has_slaves(self%scene)) return
-      call expand(self%scene, self%scene%hinges%locked, opening, q(:self%scene%n_dof))
-      call expand(self%scene, self%scene%hinges%locked, opening_rate, p)
+      if (.not. has_slaves(self%hinges)) return
+      call expand(self%scene, self%hinges%locked, opening, q(:self%scene%n_dof))
+      call expand(self%scene, self%hinges%locked, opening_rate, p)
    end subroutine project_locked
 
    !> Joint rotations th of all hinges: where `set_locked` may hold them.
@@ -249,7 +263,7 @@ contains
       real(wp) :: theta_rate(0:self%scene%n - 1), moment(0:self%scene%n), moment_rate(0:self%scene%n)
 
       associate (scene => self%scene, first => self%scene%n_base + 1)
-         call hinge_state(scene%hinges, scene%n, scene%dynamic_bending, q(first:), p(first:), theta, theta_rate, moment, &
+         call hinge_state(self%hinges, scene%n, scene%dynamic_bending, q(first:), p(first:), theta, theta_rate, moment, &
                           moment_rate)
       end associate
    end subroutine hinge_rotations
@@ -305,20 +319,20 @@ contains
       real(wp), intent(out) :: acceleration(self%scene%n_dof) !! p'
       logical, intent(out) :: ok               !! false: not finite, or M not positive definite
 
-      associate (scene => self%scene, work => self%work, first => self%scene%n_base + 1)
+      associate (scene => self%scene, hinges => self%hinges, work => self%work, first => self%scene%n_base + 1)
          if (self%varying) call self%refresh(t, q, p)
          call sine_cosine(scene%n, q(first), work%sine(1:), work%cosine(1:))
          if (self%needs_moments) then
             if (allocated(self%zero)) then
-               call hinge_moments(scene%hinges, scene%n, scene%dynamic_bending, self%zero, self%zero, work%theta, work%moment)
+               call hinge_moments(hinges, scene%n, scene%dynamic_bending, self%zero, self%zero, work%theta, work%moment)
             else
-               call hinge_moments(scene%hinges, scene%n, scene%dynamic_bending, q(first), p(first), work%theta, work%moment)
+               call hinge_moments(hinges, scene%n, scene%dynamic_bending, q(first), p(first), work%theta, work%moment)
             end if
          end if
          select case (self%path)
          case (path_flexible)
             call flexible_accelerations(scene%n, scene%n_base, scene%rods, scene%rod_of, scene%node_mass, scene%body, &
-                                        work%sine, work%cosine, q, p, scene%hinges, self%forces%base, &
+                                        work%sine, work%cosine, q, p, hinges, self%forces%base, &
                                         self%regime%on_nodes, self%forces%node, work%outward, acceleration, ok)
          case (path_rigid)
             call rigid_accelerations(scene%n, scene%n_base, scene%rods, scene%rod_of, scene%node_mass, scene%body, &
@@ -329,11 +343,11 @@ contains
                                       work%sine, work%cosine, p, work%moment, self%forces%base, &
                                       self%regime%on_nodes, self%forces%node, work%outward, acceleration, ok)
          case (path_joints)
-            call joint_accelerations(self%joints, scene, work%sine, work%cosine, q, p, .true., scene%hinges%locked, &
+            call joint_accelerations(self%joints, scene, work%sine, work%cosine, q, p, .true., hinges%locked, &
                                      self%opening_acceleration, work%moment, self%forces%base, self%regime%on_nodes, &
                                      self%forces%node, acceleration, ok)
          case default
-            call assembled_accelerations(self%system, scene, work%sine, work%cosine, q, p, work%moment, &
+            call assembled_accelerations(self%system, scene, hinges, work%sine, work%cosine, q, p, work%moment, &
                                          self%opening_acceleration, self%forces%base, self%regime%on_nodes, &
                                          self%forces%node, acceleration, ok)
          end select
@@ -349,7 +363,7 @@ contains
       logical, intent(out) :: ok                              !! false: not in every lane
       logical :: lane_ok(lanes)
 
-      if (.not. suits_lanes(self%scene) .or. associated(self%user)) then
+      if (.not. suits_lanes(self%scene, self%hinges) .or. associated(self%user)) then
          call one_by_one(self, t, q, p, acceleration, ok)
          return
       end if
@@ -387,16 +401,16 @@ contains
 
       if (.not. allocated(self%group)) then
          allocate (self%group)
-         call new_lane_scene(self%group, self%scene, one_rod_each=.false.)
+         call new_lane_scene(self%group, self%scene, self%hinges, one_rod_each=.false.)
          call new_lane_work(self%group_work, self%group)
       end if
       self%group%loaded = self%regime%on_nodes
       do i = 1, lanes
          if (self%varying) call evaluate_loads(self%forces, self%regime, t(i), fresh=.false.)
-         if (self%scene%hinges%driven) then
+         if (self%hinges%driven) then
             call self%move_kinks(t(i))
             do k = 0, self%scene%n - 1
-               self%group%kink_moment(i, k) = self%scene%hinges%offset(k)
+               self%group%kink_moment(i, k) = self%hinges%offset(k)
             end do
          end if
          self%group%base_force(i, :) = self%forces%base

@@ -10,6 +10,7 @@ module rodyn_assembled
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type, raise
    use rodyn_scene, only: scene_type
+   use rodyn_hinge_law, only: hinge_law
    use rodyn_bending_matrices, only: most_shapes
    use rodyn_locks, only: has_slaves, reduce, expand, reduce_matrix, reactions
    use rodyn_lapack, only: dpotrf, dpotrs, dgesv, dgemv
@@ -38,9 +39,10 @@ module rodyn_assembled
 contains
 
    !> Constant matrices of a scene. Fails if there is no memory for O(n^2) numbers.
-   subroutine new_assembled_system(system, scene, error)
+   subroutine new_assembled_system(system, scene, hinges, error)
       type(assembled_system), intent(out) :: system
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: b(:, :), c(:, :), r(:, :)
       real(wp) :: factor(0:scene%n - 1), angle(0:scene%n - 1)
@@ -57,15 +59,15 @@ contains
                     " GiB for this scene; use 'recursive'")
          return
       end if
-      system%damped = scene%hinges%has_damping
-      system%moving = scene%hinges%driven .or. size(scene%hinges%mechanisms) > 0
+      system%damped = hinges%has_damping
+      system%moving = hinges%driven .or. size(hinges%mechanisms) > 0
       call joint_map(scene, b)
       r = 0.0_wp ! th = r q - r_gamma
       c = b
-      if (scene%quasistatic) call soften(scene, c)
+      if (scene%quasistatic) call soften(scene, hinges, c)
       ! Generalised spring force -K q + Q2 with K = B^T C G B; dampers D = (G B)^T D (G B). A locked hinge has neither;
       ! with quasistatic bending its row of G B is that of its moment.
-      associate (law => scene%hinges)
+      associate (law => hinges)
          factor = merge(merge(1.0_wp, 0.0_wp, scene%quasistatic), law%stiffness, law%locked)
          angle = law%kink
          angle(law%held) = angle(law%held) + law%held_at
@@ -101,16 +103,17 @@ contains
 
    !> Quasistatic bending: G B with G = (I + F C)^-1, F the flexibility of the rods (three moments). Of a locked hinge
    !> the moment is the unknown and th is given: its column is that of F alone.
-   subroutine soften(scene, b)
+   subroutine soften(scene, hinges, b)
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       real(wp), intent(inout) :: b(0:, :)
       real(wp) :: g(0:scene%n - 1, 0:scene%n - 1), c(0:scene%n - 1)
       integer :: pivots(scene%n), info, k
 
       g = 0.0_wp
-      c = merge(1.0_wp, scene%hinges%stiffness, scene%hinges%locked)
+      c = merge(1.0_wp, hinges%stiffness, hinges%locked)
       do k = 0, scene%n - 1
-         if (.not. scene%hinges%locked(k)) g(k, k) = 1.0_wp
+         if (.not. hinges%locked(k)) g(k, k) = 1.0_wp
       end do
       do k = 1, scene%n
          associate (f => scene%rods(scene%rod_of(k))%flexibility)
@@ -142,10 +145,11 @@ contains
    end subroutine add_bending
 
    !> p' from M p' = Q1 + Q2 - N z - D p - K q by Cholesky.
-   subroutine assembled_accelerations(system, scene, sine, cosine, q, p, moment, opening_acceleration, base_force, loaded, &
-                                      node_force, acceleration, ok)
+   subroutine assembled_accelerations(system, scene, hinges, sine, cosine, q, p, moment, opening_acceleration, base_force, &
+                                      loaded, node_force, acceleration, ok)
       type(assembled_system), intent(inout) :: system
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       real(wp), intent(in) :: sine(0:), cosine(0:) !! of phi (0:n)
       real(wp), intent(in) :: q(:), p(:)           !! coordinates and rates (dof)
       real(wp), intent(inout) :: moment(0:)        !! hinge moments (0:n), used if hinges relax: T is then no K q + D p;
@@ -167,21 +171,21 @@ contains
       if (scene%n_base > 0) acceleration(1:3) = base_force
       if (loaded) call add_node_forces(scene, sine, cosine, node_force, acceleration)
       call dgemv('N', n_dof, n_dof, -1.0_wp, system%n, n_dof, system%z, 1, 1.0_wp, acceleration, 1)
-      if (size(scene%hinges%relaxing) > 0) then
+      if (size(hinges%relaxing) > 0) then
          associate (first => scene%phi_at() + 1, n => scene%n)
             acceleration(first:) = acceleration(first:) + moment(1:n) - moment(0:n - 1)
          end associate
       else
          if (system%moving) then
-            call add_moments(scene, moment, acceleration)
+            call add_moments(scene, hinges, moment, acceleration)
          else if (system%kinked) then
             acceleration = acceleration + system%q2
          end if
          call dgemv('N', n_dof, n_dof, -1.0_wp, system%k, n_dof, q, 1, 1.0_wp, acceleration, 1)
          if (system%damped) call dgemv('N', n_dof, n_dof, -1.0_wp, system%d, n_dof, p, 1, 1.0_wp, acceleration, 1)
       end if
-      if (has_slaves(scene)) then
-         call solve_locked(system, scene, opening_acceleration, acceleration, moment, ok)
+      if (has_slaves(hinges)) then
+         call solve_locked(system, scene, hinges%locked, opening_acceleration, acceleration, moment, ok)
          return
       end if
       call dpotrf('L', n_dof, system%m, n_dof, info)
@@ -192,8 +196,9 @@ contains
    end subroutine assembled_accelerations
 
    !> Forces of moments T(0:n) in the hinges, T(n) = 0, but those of locked hinges that `solve_locked` finds.
-   pure subroutine add_moments(scene, moment, force)
+   pure subroutine add_moments(scene, hinges, moment, force)
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       real(wp), intent(in) :: moment(0:)
       real(wp), intent(inout) :: force(:)
       real(wp) :: inner, outer
@@ -202,7 +207,7 @@ contains
       outer = 0.0_wp
       do k = scene%n, 1, -1
          inner = moment(k - 1)
-         if (scene%hinges%locked(k - 1) .and. .not. scene%quasistatic) inner = 0.0_wp
+         if (hinges%locked(k - 1) .and. .not. scene%quasistatic) inner = 0.0_wp
          force(scene%phi_at() + k) = force(scene%phi_at() + k) + outer - inner
          if (scene%dynamic_bending) then
             force(scene%alpha_at() + k) = force(scene%alpha_at() + k) - inner
@@ -214,9 +219,10 @@ contains
 
    !> The same with locked hinges: with p' = T z + a, a the part that is given, T^T M T z = T^T (forces - M a). N and its
    !> z are used up.
-   subroutine solve_locked(system, scene, opening_acceleration, x, moment, ok)
+   subroutine solve_locked(system, scene, locked, opening_acceleration, x, moment, ok)
       type(assembled_system), intent(inout) :: system
       type(scene_type), intent(in) :: scene
+      logical, intent(in) :: locked(0:)
       real(wp), intent(in) :: opening_acceleration(0:)
       real(wp), intent(inout) :: x(:)       !! in: forces; out: p'
       real(wp), intent(inout) :: moment(0:) !! of locked hinges: results
@@ -228,20 +234,20 @@ contains
          mass = system%m
          forces = x
          x = 0.0_wp
-         call expand(scene, scene%hinges%locked, opening_acceleration, x)
+         call expand(scene, locked, opening_acceleration, x)
          lacking = forces
          call dgemv('N', n_dof, n_dof, -1.0_wp, mass, n_dof, x, 1, 1.0_wp, lacking, 1)
-         call reduce(scene, lacking)
-         call reduce_matrix(scene, 1.0_wp, system%m)
+         call reduce(scene, locked, lacking)
+         call reduce_matrix(scene, locked, 1.0_wp, system%m)
          call dpotrf('L', n_dof, system%m, n_dof, info)
          ok = info == 0
          if (.not. ok) return
          call dpotrs('L', n_dof, 1, system%m, n_dof, lacking, n_dof, info)
          x = lacking
-         call expand(scene, scene%hinges%locked, opening_acceleration, x)
+         call expand(scene, locked, opening_acceleration, x)
          lacking = -forces
          call dgemv('N', n_dof, n_dof, 1.0_wp, mass, n_dof, x, 1, 1.0_wp, lacking, 1)
-         call reactions(scene, lacking, moment)
+         call reactions(scene, locked, lacking, moment)
       end associate
       ok = info == 0 .and. all(ieee_is_finite(x))
    end subroutine solve_locked

@@ -221,17 +221,18 @@ contains
       integer, allocatable :: free(:)
       integer :: i
 
-      associate (b => motion%dynamics%scene%n_base, r => motion%n_q, m => motion%n_dof, scene => motion%dynamics%scene)
-         if (.not. allocated(motion%system%m)) call new_assembled_system(motion%system, scene, error)
+      associate (b => motion%dynamics%scene%n_base, r => motion%n_q, m => motion%n_dof, scene => motion%dynamics%scene, &
+                 hinges => motion%dynamics%hinges)
+         if (.not. allocated(motion%system%m)) call new_assembled_system(motion%system, scene, hinges, error)
          if (allocated(error)) return
-         free = free_coordinates(scene)
+         free = free_coordinates(scene, hinges)
          solver%chain = free(b + 1:)
-         solver%joints = pack([(i, i=1, r - m)], .not. scene%hinges%locked(scene%hinges%relaxing))
+         solver%joints = pack([(i, i=1, r - m)], .not. hinges%locked(hinges%relaxing))
          solver%kept = [solver%chain, m + solver%joints]
          associate (n => size(solver%kept))
             allocate (solver%lacking(n), solver%acceleration(m), solver%carried(m, b), solver%pivots(n))
          end associate
-         solver%weight = [spread(1.0_wp, 1, size(free) - b), scene%hinges%damping(scene%hinges%relaxing(solver%joints))]
+         solver%weight = [spread(1.0_wp, 1, size(free) - b), hinges%damping(hinges%relaxing(solver%joints))]
       end associate
    end subroutine new_newton_solver
 
@@ -249,14 +250,14 @@ contains
       call motion%rhs(t, y, rate, ok)
       if (.not. ok) return
       associate (b => motion%dynamics%scene%n_base, r => motion%n_q, m => motion%n_dof, scene => motion%dynamics%scene, &
-                 work => motion%dynamics%work, mass => motion%system%m)
+                 hinges => motion%dynamics%hinges, work => motion%dynamics%work, mass => motion%system%m)
          call mass_matrix(motion%system, scene, work%sine, work%cosine, y(1:r))
          forces = matmul(mass, rate(r + 1:r + m))
          solver%carried = mass(:, 1:b)
-         if (has_slaves(scene)) then
-            call reduce(scene, forces)
+         if (has_slaves(hinges)) then
+            call reduce(scene, hinges%locked, forces)
             do j = 1, b
-               call reduce(scene, solver%carried(:, j))
+               call reduce(scene, hinges%locked, solver%carried(:, j))
             end do
          end if
          solver%acceleration = 0.0_wp
@@ -288,18 +289,19 @@ contains
       real(wp) :: tangent(motion%n_q, motion%n_q)
       integer :: i, info, n
 
-      associate (b => motion%dynamics%scene%n_base, r => motion%n_q, m => motion%n_dof, scene => motion%dynamics%scene)
+      associate (b => motion%dynamics%scene%n_base, r => motion%n_q, m => motion%n_dof, scene => motion%dynamics%scene, &
+                 hinges => motion%dynamics%hinges)
          call balance_derivatives(motion, y, solver%acceleration, tangent(1:m, :), tangent(m + 1:r, :))
          tangent(1:m, 1:m) = tangent(1:m, 1:m) + drag*motion%system%m
          tangent(m + 1:r, :) = -tangent(m + 1:r, :)
-         if (has_slaves(scene)) then
+         if (has_slaves(hinges)) then
             do i = 1, m
-               call reduce(scene, tangent(1:m, i))
+               call reduce(scene, hinges%locked, tangent(1:m, i))
             end do
          end if
          tangent(1:m, :) = tangent(1:m, :) - matmul(solver%carried, tangent(1:b, :))
-         if (has_slaves(scene)) then ! and no relaxing hinges
-            expansion = expansion_matrix(scene)
+         if (has_slaves(hinges)) then ! and no relaxing hinges
+            expansion = expansion_matrix(scene, hinges)
             solver%lu = matmul(tangent(solver%chain, :), expansion(:, b + 1:))
          else
             solver%lu = tangent(solver%kept, solver%kept)
@@ -332,7 +334,8 @@ contains
 
       n = size(solver%scale)
       ok = .true.
-      associate (b => motion%dynamics%scene%n_base, m => motion%n_dof, scene => motion%dynamics%scene)
+      associate (b => motion%dynamics%scene%n_base, m => motion%n_dof, scene => motion%dynamics%scene, &
+                 hinges => motion%dynamics%hinges)
          step = solver%lacking/solver%scale
          if (n > 0) call dgetrs('N', n, 1, solver%lu, n, solver%pivots, step, n, info)
          if (n > 0) ok = info == 0 .and. all(abs(step) <= huge(step))
@@ -340,7 +343,7 @@ contains
          whole = 0.0_wp
          whole(solver%kept) = step
          still = 0.0_wp
-         if (has_slaves(scene)) call expand(scene, scene%hinges%locked, still, whole)
+         if (has_slaves(hinges)) call expand(scene, hinges%locked, still, whole)
          step = whole(b + 1:)
       end associate
    end subroutine newton_step

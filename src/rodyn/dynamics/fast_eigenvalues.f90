@@ -10,7 +10,7 @@ module rodyn_fast_eigenvalues
    use rodyn_errors, only: error_type
    use rodyn_scene, only: scene_type
    use rodyn_motion, only: motion_type, new_motion
-   use rodyn_hinge_law, only: openings
+   use rodyn_hinge_law, only: hinge_law, openings
    use rodyn_linearisation, only: balance_tangent
    use rodyn_fastest_rates, only: by_springs, by_dampers
    use rodyn_accelerations, only: dynamics_type, new_dynamics
@@ -75,19 +75,22 @@ contains
       type(dynamics_type) :: dynamics
       type(error_type), allocatable :: error
       real(wp) :: stiffness, damping, part, at_rest(size(q))
-      type(scene_type) :: relaxed
+      type(scene_type) :: recursive
+      type(hinge_law) :: relaxed
       integer :: i
 
       call relax(scene, q, relaxed, at_rest)
-      call new_dynamics(dynamics, relaxed, error)
+      recursive = scene
+      recursive%assembled = .false.
+      call new_dynamics(dynamics, recursive, error, relaxed)
       allocate (lambda(n_ways, merge(0, 2, allocated(error))))
       if (allocated(error)) return
       stiffness = greatest_rate(dynamics, at_rest, springs)
       damping = 0.0_wp
       if (scene%hinges%has_damping) then
          if (.not. scene%quasistatic) then ! the rounding of large moments that cancel would drown weak dampers
-            dynamics%scene%hinges%stiffness = 0.0_wp
-            dynamics%scene%hinges%offset = 0.0_wp
+            dynamics%hinges%stiffness = 0.0_wp
+            dynamics%hinges%offset = 0.0_wp
          end if
          damping = greatest_rate(dynamics, at_rest, dampers)
       end if
@@ -98,31 +101,28 @@ contains
       end do
    end subroutine extreme_eigenvalues
 
-   !> The scene at the same chord angles, with kinks that leave no moment anywhere, in the recursive kernel.
+   !> Hinges at the same chord angles with kinks that leave no moment anywhere.
    subroutine relax(scene, q, relaxed, at_rest)
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: q(:) !! (n_q)
-      type(scene_type), intent(out) :: relaxed
+      type(hinge_law), intent(out) :: relaxed
       real(wp), intent(out) :: at_rest(:) !! (n_q)
       real(wp) :: opening(0:scene%n - 1)
       integer :: first, last
 
-      relaxed = scene
-      relaxed%assembled = .false.
+      relaxed = scene%hinges
       first = scene%phi_at() + 1
       last = scene%phi_at() + scene%n
       at_rest = 0.0_wp
       at_rest(first:last) = q(first:last)
       call openings(scene%n, scene%dynamic_bending, at_rest(first:), opening)
-      associate (hinges => relaxed%hinges)
-         hinges%driven = .false.
-         hinges%has_offsets = .true.
-         hinges%constant = 0.0_wp
-         hinges%friction = 0.0_wp
-         hinges%steady = 0.0_wp
-         hinges%bent = 0.0_wp
-         call hinges%set_kinks(opening, spread(0.0_wp, 1, scene%n))
-      end associate
+      relaxed%driven = .false.
+      relaxed%has_offsets = .true.
+      relaxed%constant = 0.0_wp
+      relaxed%friction = 0.0_wp
+      relaxed%steady = 0.0_wp
+      relaxed%bent = 0.0_wp
+      call relaxed%set_kinks(opening, spread(0.0_wp, 1, scene%n))
    end subroutine relax
 
    !> The faster root of lambda^2 + damping lambda + stiffness = 0.
@@ -162,7 +162,7 @@ contains
          if (which == dampers) then
             call drop_undamped(dynamics%scene, v)
          else
-            call drop_unsprung(dynamics%scene, v)
+            call drop_unsprung(dynamics%scene, dynamics%hinges%stiffness, v)
          end if
       end do
       if (i > 1) greatest_rate = largest_of(diagonal(:i - 1), beside(2:i - 1))
@@ -186,8 +186,9 @@ contains
    end subroutine drop_undamped
 
    !> Springs see neither the motion of the spacecraft nor the openings of hinges that have none. The same of x is put to rest.
-   subroutine drop_unsprung(scene, x)
+   subroutine drop_unsprung(scene, stiffness, x)
       type(scene_type), intent(in) :: scene
+      real(wp), intent(in) :: stiffness(0:) !! of the hinges (0:n-1) [N m/rad]
       real(wp), intent(inout) :: x(:) !! (n_dof)
       real(wp) :: opening(0:scene%n - 1), turned
       integer :: k
@@ -196,7 +197,7 @@ contains
       call openings(scene%n, scene%dynamic_bending, x(scene%phi_at() + 1:), opening)
       turned = 0.0_wp
       do k = 1, scene%n
-         if (.not. scene%hinges%stiffness(k - 1) > 0.0_wp) turned = turned + opening(k - 1)
+         if (.not. stiffness(k - 1) > 0.0_wp) turned = turned + opening(k - 1)
          x(scene%phi_at() + k) = x(scene%phi_at() + k) - turned
       end do
    end subroutine drop_unsprung
@@ -213,9 +214,9 @@ contains
       moved = 0.0_wp
       if (which == springs) then
          moved(:size(x)) = x
-         call balance_tangent(dynamics%scene, q, rest, rest, .false., node_force, moved, rest, force)
+         call balance_tangent(dynamics%scene, dynamics%hinges, q, rest, rest, .false., node_force, moved, rest, force)
       else
-         call balance_tangent(dynamics%scene, q, rest, rest, .false., node_force, moved, x, force)
+         call balance_tangent(dynamics%scene, dynamics%hinges, q, rest, rest, .false., node_force, moved, x, force)
       end if
    end subroutine forces_of
 

@@ -10,6 +10,7 @@ module rodyn_fastest_rates
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
    use rodyn_scene, only: scene_type
+   use rodyn_hinge_law, only: hinge_law
    use rodyn_bending_matrices, only: bending_matrices
    use rodyn_rod_integrals, only: rod_integrals
    use rodyn_accelerations, only: dynamics_type, new_dynamics
@@ -24,8 +25,9 @@ module rodyn_fastest_rates
 contains
 
    !> About a configuration, at rest and without loads. Zero where there is neither spring nor damper.
-   subroutine fastest_rates(scene, q, frequency, decay)
+   subroutine fastest_rates(scene, hinges, q, frequency, decay)
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       real(wp), intent(in) :: q(:)           !! coordinates (n_q)
       real(wp), intent(out) :: frequency     !! highest natural frequency [rad/s]
       real(wp), intent(out), optional :: decay !! fastest decay if nothing but the dampers acted [1/s]
@@ -38,9 +40,9 @@ contains
       frequency = 0.0_wp
       if (present(decay)) decay = 0.0_wp
       growth = 0.0_wp
-      call new_dynamics(dynamics, scene, error)
+      call new_dynamics(dynamics, scene, error, hinges)
       if (allocated(error)) return
-      do which = 1, merge(2, 1, scene%hinges%has_damping .and. present(decay))
+      do which = 1, merge(2, 1, hinges%has_damping .and. present(decay))
          x = [(cos(2.4_wp*real(k, wp)**2), k=1, scene%n_dof)] ! something of everything
          if (scene%n_base > 0) x(1:3) = 0.0_wp
          steady = 0
@@ -61,7 +63,7 @@ contains
          end do
       end do
       frequency = sqrt(growth(1))
-      if (present(decay)) decay = max(growth(2), scene%hinges%fastest_relaxation())
+      if (present(decay)) decay = max(growth(2), hinges%fastest_relaxation())
    end subroutine fastest_rates
 
    !> The scene without the bending of its rods: what is left of its spectrum are the slow motions of the chain. Scenes

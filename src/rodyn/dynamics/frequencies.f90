@@ -5,6 +5,7 @@ module rodyn_frequencies
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type, raise
    use rodyn_scene, only: scene_type
+   use rodyn_hinge_law, only: hinge_law
    use rodyn_assembled, only: assembled_system, new_assembled_system, mass_matrix
    use rodyn_locks, only: has_slaves, free_coordinates, reduce_matrix
    use rodyn_lapack, only: symmetric_eigenvalues
@@ -15,8 +16,9 @@ module rodyn_frequencies
 contains
 
    !> All natural frequencies, rising; rigid-body motions give zeros (to rounding).
-   subroutine natural_frequencies(scene, q, frequency, error)
+   subroutine natural_frequencies(scene, hinges, q, frequency, error)
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       real(wp), intent(in) :: q(:)                       !! coordinates (dof)
       real(wp), allocatable, intent(out) :: frequency(:) !! (dof less redundant coordinates) [rad/s]
       type(error_type), allocatable, intent(out) :: error
@@ -26,30 +28,32 @@ contains
          call raise(error, 'natural_frequencies: the scene is not compiled, or has more coordinates than q')
          return
       end if
-      call new_assembled_system(system, scene, error)
+      call new_assembled_system(system, scene, hinges, error)
       if (allocated(error)) return
-      call eigenvalues(scene, q, system, system%k, frequency, error)
+      call eigenvalues(scene, hinges, q, system, system%k, frequency, error)
       if (allocated(error)) return
       frequency = sqrt(max(frequency, 0.0_wp))
    end subroutine natural_frequencies
 
    !> Rates of decay if nothing but the dampers acted, rising: 2 zeta w of a lightly damped mode, and the stiff
    !> end of the spectrum when the dampers are strong.
-   subroutine decay_rates(scene, q, rate, error)
+   subroutine decay_rates(scene, hinges, q, rate, error)
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       real(wp), intent(in) :: q(:)                  !! coordinates (dof)
       real(wp), allocatable, intent(out) :: rate(:) !! (dof less redundant coordinates) [1/s]
       type(error_type), allocatable, intent(out) :: error
       type(assembled_system) :: system
 
-      call new_assembled_system(system, scene, error)
+      call new_assembled_system(system, scene, hinges, error)
       if (allocated(error)) return
-      call eigenvalues(scene, q, system, system%d, rate, error)
+      call eigenvalues(scene, hinges, q, system, system%d, rate, error)
    end subroutine decay_rates
 
    !> Eigenvalues of A x = lambda M(q) x, rising; A is overwritten.
-   subroutine eigenvalues(scene, q, system, a, value, error)
+   subroutine eigenvalues(scene, hinges, q, system, a, value, error)
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       real(wp), intent(in) :: q(:)
       type(assembled_system), intent(inout) :: system
       real(wp), intent(in) :: a(:, :)
@@ -66,10 +70,10 @@ contains
       cosine(1:) = cos(q(scene%phi_at() + 1:scene%phi_at() + scene%n))
       call mass_matrix(system, scene, sine, cosine, q)
       mass = system%m
-      if (has_slaves(scene)) then
-         call reduce_matrix(scene, 1.0_wp, mass)
-         call reduce_matrix(scene, 0.0_wp, matrix)
-         free = free_coordinates(scene)
+      if (has_slaves(hinges)) then
+         call reduce_matrix(scene, hinges%locked, 1.0_wp, mass)
+         call reduce_matrix(scene, hinges%locked, 0.0_wp, matrix)
+         free = free_coordinates(scene, hinges)
          mass = mass(free, free)
          matrix = matrix(free, free)
       end if

@@ -125,7 +125,7 @@ contains
 
       call dynamics%move_kinks(t)
       associate (scene => dynamics%scene, first => dynamics%scene%n_base + 1)
-         call hinge_state(scene%hinges, scene%n, scene%dynamic_bending, q(first:), p(first:), self%theta, self%theta_rate, &
+         call hinge_state(dynamics%hinges, scene%n, scene%dynamic_bending, q(first:), p(first:), self%theta, self%theta_rate, &
                           self%moment, self%moment_rate)
       end associate
    end subroutine find_joints
@@ -150,7 +150,7 @@ contains
       type(dynamics_type), intent(in) :: dynamics
       integer, intent(in) :: i !! margin
       real(wp), intent(in) :: t
-      associate (mechanism => dynamics%scene%hinges%mechanisms(self%mechanism(i)))
+      associate (mechanism => dynamics%hinges%mechanisms(self%mechanism(i)))
          margin_of = mechanism%margin(self%part(i), t, self%theta(mechanism%hinge), self%theta_rate(mechanism%hinge))
       end associate
    end function margin_of
@@ -174,8 +174,8 @@ contains
          if (.not. changed) exit
       end do
       if (changed) call raise(error, no_balance(0.0_wp))
-      do i = 1, size(dynamics%scene%hinges%mechanisms)
-         associate (mechanism => dynamics%scene%hinges%mechanisms(i))
+      do i = 1, size(dynamics%hinges%mechanisms)
+         associate (mechanism => dynamics%hinges%mechanisms(i))
             call mechanism%face_latch(self%theta(mechanism%hinge))
          end associate
       end do
@@ -198,12 +198,12 @@ contains
          if (scene%quasistatic) then
             call openings(scene%n, .false., q(scene%n_base + 1:), at)
             call openings(scene%n, .false., p(scene%n_base + 1:), turning)
-            at = at - scene%hinges%kink
-            turning = turning - scene%hinges%kink_rate
+            at = at - dynamics%hinges%kink
+            turning = turning - dynamics%hinges%kink_rate
          end if
       end associate
-      do i = 1, size(dynamics%scene%hinges%mechanisms)
-         associate (mechanism => dynamics%scene%hinges%mechanisms(i), k => dynamics%scene%hinges%mechanisms(i)%hinge)
+      do i = 1, size(dynamics%hinges%mechanisms)
+         associate (mechanism => dynamics%hinges%mechanisms(i), k => dynamics%hinges%mechanisms(i)%hinge)
             mechanism%held = mechanism%held .and. mechanism%release_time > 0.0_wp
             if (mechanism%held) call mechanism%lock(at(k))
             if (mechanism%is_constrained() .and. abs(turning(k)) > 1.0e-9_wp) then
@@ -224,9 +224,9 @@ contains
       real(wp), intent(inout) :: q(:)
       real(wp), intent(in) :: p(:)
 
-      associate (scene => dynamics%scene, relaxing => dynamics%scene%hinges%relaxing)
+      associate (scene => dynamics%scene, relaxing => dynamics%hinges%relaxing)
          if (size(relaxing) > 0) &
-            call initial_joints(scene%hinges, q(scene%phi_at() + 1:scene%phi_at() + scene%n), at, q(scene%n_dof + 1:))
+            call initial_joints(dynamics%hinges, q(scene%phi_at() + 1:scene%phi_at() + scene%n), at, q(scene%n_dof + 1:))
          call find_joints(self, dynamics, 0.0_wp, q, p)
          self%theta_rate(relaxing) = 0.0_wp
       end associate
@@ -242,17 +242,17 @@ contains
       integer :: i
 
       call find_joints(self, dynamics, t, q, p)
-      stiffness = dynamics%scene%hinges%stiffness
-      constant = dynamics%scene%hinges%constant + dynamics%scene%hinges%friction
-      do i = 1, size(dynamics%scene%hinges%mechanisms)
-         associate (mechanism => dynamics%scene%hinges%mechanisms(i))
+      stiffness = dynamics%hinges%stiffness
+      constant = dynamics%hinges%constant + dynamics%hinges%friction
+      do i = 1, size(dynamics%hinges%mechanisms)
+         associate (mechanism => dynamics%hinges%mechanisms(i))
             if (mechanism%is_constrained()) cycle
             call mechanism%choose_laws(self%theta(mechanism%hinge), self%theta_rate(mechanism%hinge))
          end associate
       end do
       call dynamics%change_hinges()
-      changed = any(abs(stiffness - dynamics%scene%hinges%stiffness) > 0.0_wp) .or. &
-                any(abs(constant - (dynamics%scene%hinges%constant + dynamics%scene%hinges%friction)) > 0.0_wp)
+      changed = any(abs(stiffness - dynamics%hinges%stiffness) > 0.0_wp) .or. &
+                any(abs(constant - (dynamics%hinges%constant + dynamics%hinges%friction)) > 0.0_wp)
    end subroutine adopt
 
    !> Refuse a state beyond a latch, to which no motion leads.
@@ -266,7 +266,7 @@ contains
       call find_joints(self, dynamics, t, q, p)
       do i = 1, self%n
          if (self%part(i) /= part_latch .or. margin_of(self, dynamics, i, t) >= 0.0_wp) cycle
-         call raise(error, 'no equilibrium: hinge '//to_text(dynamics%scene%hinges%mechanisms(self%mechanism(i))%hinge)// &
+         call raise(error, 'no equilibrium: hinge '//to_text(dynamics%hinges%mechanisms(self%mechanism(i))%hinge)// &
                     ' latches before the chain comes to rest')
          return
       end do
@@ -289,10 +289,10 @@ contains
       do i = 1, self%n
          if (.not. crossed(i)) cycle
          if (self%part(i) == part_latch) then
-            if (dynamics%scene%hinges%mechanisms(self%mechanism(i))%at_latch) cycle ! leaves it, see `settle`
+            if (dynamics%hinges%mechanisms(self%mechanism(i))%at_latch) cycle ! leaves it, see `settle`
             call latch(self, dynamics, self%mechanism(i), t, q, p, lost, error)
          else
-            associate (mechanism => dynamics%scene%hinges%mechanisms(self%mechanism(i)))
+            associate (mechanism => dynamics%hinges%mechanisms(self%mechanism(i)))
                was = mechanism
                call mechanism%change(self%part(i), t, self%theta(mechanism%hinge), self%theta_rate(mechanism%hinge))
             end associate
@@ -317,7 +317,7 @@ contains
       real(wp) :: lost_here
       integer :: j
 
-      call dynamics%scene%hinges%mechanisms(self%mechanism(i))%list_events(was, self%part(i), self%theta(was%hinge), kinds, &
+      call dynamics%hinges%mechanisms(self%mechanism(i))%list_events(was, self%part(i), self%theta(was%hinge), kinds, &
                                                                            lost_here)
       do j = 1, size(kinds)
          if (allocated(error)) return
@@ -339,9 +339,9 @@ contains
       logical :: ok
 
       lost_here = 0.0_wp
-      call dynamics%scene%hinges%mechanisms(which)%snap()
+      call dynamics%hinges%mechanisms(which)%snap()
       call dynamics%change_hinges()
-      if (dynamics%scene%hinges%mechanisms(which)%is_constrained()) then
+      if (dynamics%hinges%mechanisms(which)%is_constrained()) then
          call dynamics%strike(q, p, lost_here, worked, ok)
          if (.not. ok) call raise(error, 'latching at t = '//time_text(t)//' s: mass matrix not positive definite')
          if (allocated(error)) return
@@ -349,7 +349,7 @@ contains
          call find_joints(self, dynamics, t, q, p)
       end if
       lost = lost + lost_here
-      call self%note(t, dynamics%scene%hinges%mechanisms(which)%hinge, kind_latched, lost_here, error)
+      call self%note(t, dynamics%hinges%mechanisms(which)%hinge, kind_latched, lost_here, error)
    end subroutine latch
 
    !> Release the hinges whose time has come.
@@ -361,7 +361,7 @@ contains
       real(wp), intent(inout) :: lost
       type(error_type), allocatable, intent(inout) :: error
       logical :: released
-      call release(self, dynamics, dynamics%scene%hinges%mechanisms%release_time <= t, t, q, p, lost, released, error)
+      call release(self, dynamics, dynamics%hinges%mechanisms%release_time <= t, t, q, p, lost, released, error)
       call release_followers(self, dynamics, t, q, p, lost, error)
    end subroutine release_due
 
@@ -373,12 +373,12 @@ contains
       real(wp), intent(inout) :: p(:)
       real(wp), intent(inout) :: lost
       type(error_type), allocatable, intent(inout) :: error
-      logical :: due(size(dynamics%scene%hinges%mechanisms)), released
+      logical :: due(size(dynamics%hinges%mechanisms)), released
       integer :: i
 
       released = .true.
       do while (released)
-         associate (mechanisms => dynamics%scene%hinges%mechanisms)
+         associate (mechanisms => dynamics%hinges%mechanisms)
             due = [(any(mechanisms%hinge == mechanisms(i)%release_after .and. mechanisms%latched), i=1, size(due))]
          end associate
          call release(self, dynamics, due, t, q, p, lost, released, error)
@@ -399,13 +399,13 @@ contains
       real(wp) :: before, lost_here, lost_in_all, in_jump
       integer :: i, last
 
-      released = any(due .and. dynamics%scene%hinges%mechanisms%held) .and. .not. allocated(error)
+      released = any(due .and. dynamics%hinges%mechanisms%held) .and. .not. allocated(error)
       if (.not. released) return
       call find_joints(self, dynamics, t, q, p)
-      before = elastic_energy(dynamics%scene, q, p)
+      before = elastic_energy(dynamics%scene, dynamics%hinges, q, p)
       lost_in_all = 0.0_wp
       do i = 1, size(due)
-         associate (mechanism => dynamics%scene%hinges%mechanisms(i))
+         associate (mechanism => dynamics%hinges%mechanisms(i))
             if (.not. (due(i) .and. mechanism%held)) cycle
             call mechanism%release(self%theta(mechanism%hinge), lost_here)
             lost_in_all = lost_in_all + lost_here
@@ -416,7 +416,7 @@ contains
       call dynamics%change_hinges()
       call settle(self, dynamics, t, q, p, lost_in_all, error)
       if (dynamics%scene%quasistatic) then
-         in_jump = max((before - elastic_energy(dynamics%scene, q, p)) - lost_in_all, 0.0_wp)
+         in_jump = max((before - elastic_energy(dynamics%scene, dynamics%hinges, q, p)) - lost_in_all, 0.0_wp)
          self%log(last)%energy_lost = self%log(last)%energy_lost + in_jump
          lost_in_all = lost_in_all + in_jump
       end if
@@ -449,21 +449,21 @@ contains
       real(wp) :: before(0:dynamics%scene%n - 1)
       integer :: i
 
-      was = dynamics%scene%hinges%mechanisms
+      was = dynamics%hinges%mechanisms
       before = self%theta
       do
          if (.not. allocated(error)) call balance(self, dynamics, t, q, p, error)
          if (allocated(error)) return
          i = first_latch(self, dynamics, before, t)
          if (i == 0) exit
-         associate (mechanism => dynamics%scene%hinges%mechanisms(i))
+         associate (mechanism => dynamics%hinges%mechanisms(i))
             if (dynamics%scene%quasistatic .and. .not. mechanism%lock_stiffness > 0.0_wp) &
                call mechanism%choose_laws(mechanism%latch, 0.0_wp) ! its springs stay as they are there
          end associate
          call latch(self, dynamics, i, t, q, p, lost, error)
       end do
       do i = 1, size(was)
-         associate (mechanism => dynamics%scene%hinges%mechanisms(i))
+         associate (mechanism => dynamics%hinges%mechanisms(i))
             if (mechanism%at_latch .and. .not. mechanism%locked) call mechanism%face_latch(self%theta(mechanism%hinge))
          end associate
       end do
@@ -487,7 +487,7 @@ contains
       do i = 1, self%n
          if (self%part(i) /= part_latch) cycle
          if (.not. margin_of(self, dynamics, i, t) < 0.0_wp) cycle
-         associate (mechanism => dynamics%scene%hinges%mechanisms(self%mechanism(i)))
+         associate (mechanism => dynamics%hinges%mechanisms(self%mechanism(i)))
             if (mechanism%at_latch) cycle
             way = (mechanism%latch - before(mechanism%hinge))/(self%theta(mechanism%hinge) - before(mechanism%hinge))
             if (first > 0 .and. .not. way < shortest) cycle
@@ -522,7 +522,7 @@ contains
       real(wp), intent(in) :: t
       integer, intent(in) :: pass
       logical, intent(out) :: changed
-      logical :: moved(size(dynamics%scene%hinges%mechanisms))
+      logical :: moved(size(dynamics%hinges%mechanisms))
       integer :: i
 
       moved = .false.
@@ -530,7 +530,7 @@ contains
          if (any(moved) .and. (i == self%n_series + 1 .or. pass > quick_passes)) exit
          if (self%part(i) == part_latch .or. moved(self%mechanism(i))) cycle
          if (.not. margin_of(self, dynamics, i, t) < 0.0_wp) cycle
-         associate (mechanism => dynamics%scene%hinges%mechanisms(self%mechanism(i)))
+         associate (mechanism => dynamics%hinges%mechanisms(self%mechanism(i)))
             call mechanism%change(self%part(i), t, self%theta(mechanism%hinge), self%theta_rate(mechanism%hinge))
          end associate
          moved(self%mechanism(i)) = .true.

@@ -4,7 +4,7 @@ module rodyn_kinematics
    use rodyn_kinds, only: wp
    use rodyn_scene, only: scene_type
    use rodyn_bending_matrices, only: most_shapes
-   use rodyn_hinge_law, only: hinge_state, hinge_rates, spring_energy
+   use rodyn_hinge_law, only: hinge_law, hinge_state, hinge_rates, spring_energy
    use rodyn_three_moments, only: slopes_from_moments
    implicit none (type, external)
    private
@@ -28,8 +28,9 @@ module rodyn_kinematics
 contains
 
    !> Energies and momenta of a state.
-   pure function invariants(scene, q, p) result(values)
+   pure function invariants(scene, hinges, q, p) result(values)
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       real(wp), intent(in) :: q(:), p(:) !! coordinates and rates (dof)
       type(invariants_type) :: values
       type(chain_sums) :: sums
@@ -50,18 +51,19 @@ contains
             sums%turning = sums%turning + body%mass*cross(place, velocity) + body%inertia*p(3)
          end associate
       end if
-      values%elastic = elastic_energy(scene, q, p)
+      values%elastic = elastic_energy(scene, hinges, q, p)
       values%momentum = [cos(rotation)*sums%momentum(1) - sin(rotation)*sums%momentum(2), &
                          sin(rotation)*sums%momentum(1) + cos(rotation)*sums%momentum(2)]
       values%angular_momentum = sums%turning
    end function invariants
 
    !> Kinetic energy [J].
-   pure real(wp) function kinetic_energy(scene, q, p)
+   pure real(wp) function kinetic_energy(scene, hinges, q, p)
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       real(wp), intent(in) :: q(:), p(:)
       type(invariants_type) :: values
-      values = invariants(scene, q, p)
+      values = invariants(scene, hinges, q, p)
       kinetic_energy = values%kinetic
    end function kinetic_energy
 
@@ -127,8 +129,9 @@ contains
    end function cross
 
    !> Elastic energy of hinges and rods [J].
-   pure real(wp) function elastic_energy(scene, q, p)
+   pure real(wp) function elastic_energy(scene, hinges, q, p)
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       real(wp), intent(in) :: q(:), p(:)
       real(wp), dimension(0:scene%n - 1) :: theta, theta_rate
       real(wp), dimension(0:scene%n) :: moment, moment_rate
@@ -136,10 +139,10 @@ contains
       integer :: k
 
       associate (first => scene%n_base + 1)
-         call hinge_state(scene%hinges, scene%n, scene%dynamic_bending, q(first:), p(first:), theta, theta_rate, &
+         call hinge_state(hinges, scene%n, scene%dynamic_bending, q(first:), p(first:), theta, theta_rate, &
                           moment, moment_rate)
       end associate
-      elastic_energy = spring_energy(scene%hinges, theta)
+      elastic_energy = spring_energy(hinges, theta)
       if (.not. (scene%dynamic_bending .or. scene%quasistatic)) return
       if (scene%dynamic_bending) then
          do k = 1, scene%n
@@ -149,7 +152,7 @@ contains
          end do
          return
       end if
-      call slopes(scene, q, p, alpha, beta, alpha_rate, beta_rate)
+      call slopes(scene, hinges, q, p, alpha, beta, alpha_rate, beta_rate)
       do k = 1, scene%n
          associate (s => scene%rods(scene%rod_of(k))%stiffness, carry => scene%rods(scene%rod_of(k))%carry_over)
             elastic_energy = elastic_energy + 0.5_wp*s(1)* &
@@ -159,8 +162,9 @@ contains
    end function elastic_energy
 
    !> End slopes alpha, beta and their rates: states, or slaved to the moments in the hinges, or zero.
-   pure subroutine slopes(scene, q, p, alpha, beta, alpha_rate, beta_rate)
+   pure subroutine slopes(scene, hinges, q, p, alpha, beta, alpha_rate, beta_rate)
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       real(wp), intent(in) :: q(:), p(:)
       real(wp), intent(out) :: alpha(:), beta(:)           !! (n) [rad]
       real(wp), intent(out) :: alpha_rate(:), beta_rate(:) !! (n) [rad/s]
@@ -171,7 +175,7 @@ contains
       beta = 0.0_wp
       alpha_rate = 0.0_wp
       beta_rate = 0.0_wp
-      associate (n => scene%n, first => scene%n_base + 1, hinges => scene%hinges)
+      associate (n => scene%n, first => scene%n_base + 1)
          if (scene%dynamic_bending) then
             alpha = q(scene%alpha_at() + 1:scene%alpha_at() + n)
             beta = q(scene%beta_at() + 1:scene%beta_at() + n)
@@ -186,22 +190,23 @@ contains
    end subroutine slopes
 
    !> Power that dampers and sliding friction take, sum D th'^2 + f th' [W], in scenes without relaxing hinges.
-   pure subroutine damper_power(scene, p, rate, power)
+   pure subroutine damper_power(scene, hinges, p, rate, power)
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       real(wp), intent(in) :: p(:)
       real(wp), intent(inout) :: rate(0:) !! workspace (0:n-1): th' [rad/s]
       real(wp), intent(out) :: power      !! [W]
       integer :: k
 
       power = 0.0_wp
-      if (.not. (scene%hinges%has_damping .or. scene%hinges%has_friction)) return
-      call hinge_rates(scene%hinges, scene%n, scene%dynamic_bending, p(scene%n_base + 1:), rate)
+      if (.not. (hinges%has_damping .or. hinges%has_friction)) return
+      call hinge_rates(hinges, scene%n, scene%dynamic_bending, p(scene%n_base + 1:), rate)
       do k = 0, scene%n - 1
-         power = power + scene%hinges%damping(k)*rate(k)**2
+         power = power + hinges%damping(k)*rate(k)**2
       end do
-      if (.not. scene%hinges%has_friction) return
+      if (.not. hinges%has_friction) return
       do k = 0, scene%n - 1
-         power = power + scene%hinges%friction(k)*rate(k)
+         power = power + hinges%friction(k)*rate(k)
       end do
    end subroutine damper_power
 

@@ -39,7 +39,7 @@ contains
 
       motion%n_dof = scene%n_dof
       motion%turning = scene%n_base > 0
-      call new_lane_scene(motion%group, scene, one_rod_each=.true.)
+      call new_lane_scene(motion%group, scene, scene%hinges, one_rod_each=.true.)
       call new_lane_work(motion%work, motion%group)
       motion%group%loaded = any(scene%loads%loads%node > 0)
    end subroutine new_lane_motion
@@ -49,7 +49,7 @@ contains
       class(lane_motion), intent(inout) :: self
       integer, intent(in) :: lane
       type(scene_type), intent(in) :: scene
-      call put_scene(self%group, lane, scene)
+      call put_scene(self%group, lane, scene, scene%hinges)
       call self%release(lane)
    end subroutine put
 

@@ -8,6 +8,7 @@ module rodyn_lane_scene
    use rodyn_lanes, only: lanes
    use rodyn_rod_constants, only: rod_constants
    use rodyn_scene, only: scene_type
+   use rodyn_hinge_law, only: hinge_law
    implicit none (type, external)
    private
    public :: lane_rod, lane_scene, new_lane_scene, put_scene, suits_lanes, are_alike
@@ -44,11 +45,12 @@ module rodyn_lane_scene
 contains
 
    !> May this scene stand in a lane?
-   pure logical function suits_lanes(scene)
+   pure logical function suits_lanes(scene, hinges)
       type(scene_type), intent(in) :: scene
-      suits_lanes = .not. scene%assembled .and. size(scene%hinges%relaxing) == 0 .and. .not. scene%hinges%has_locks .and. &
+      type(hinge_law), intent(in) :: hinges !! as they are now
+      suits_lanes = .not. scene%assembled .and. size(hinges%relaxing) == 0 .and. .not. hinges%has_locks .and. &
                     scene%n_bend < 3
-      if (scene%quasistatic) suits_lanes = suits_lanes .and. .not. scene%hinges%driven .and. size(scene%hinges%mechanisms) == 0
+      if (scene%quasistatic) suits_lanes = suits_lanes .and. .not. hinges%driven .and. size(hinges%mechanisms) == 0
    end function suits_lanes
 
    !> May these scenes, each of which suits lanes, stand side by side? They must not make each other compute anything
@@ -66,9 +68,10 @@ contains
    end function has_series_dampers
 
    !> A group with the same scene in every lane.
-   subroutine new_lane_scene(group, scene, one_rod_each)
+   subroutine new_lane_scene(group, scene, hinges, one_rod_each)
       type(lane_scene), intent(out) :: group
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       logical, intent(in) :: one_rod_each !! keep constants per rod, since other scenes will come
       integer :: i, k
 
@@ -94,25 +97,26 @@ contains
                                      source=0.0_wp)
       end associate
       do i = 1, lanes
-         call put_scene(group, i, scene)
+         call put_scene(group, i, scene, hinges)
       end do
    end subroutine new_lane_scene
 
    !> Put a scene like the others into one lane, without loads.
-   subroutine put_scene(group, lane, scene)
+   subroutine put_scene(group, lane, scene, hinges)
       type(lane_scene), intent(inout) :: group
       integer, intent(in) :: lane
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       integer :: k
 
       do k = 1, scene%n
          call put_rod(group%rods(group%rod_of(k)), lane, scene%rods(scene%rod_of(k)))
       end do
       group%node_mass(lane, :) = scene%node_mass
-      group%stiffness(lane, :) = scene%hinges%stiffness
-      group%damping(lane, :) = scene%hinges%damping
-      group%kink(lane, :) = scene%hinges%kink
-      group%kink_moment(lane, :) = scene%hinges%offset
+      group%stiffness(lane, :) = hinges%stiffness
+      group%damping(lane, :) = hinges%damping
+      group%kink(lane, :) = hinges%kink
+      group%kink_moment(lane, :) = hinges%offset
       group%mass(lane) = scene%body%mass
       group%inertia(lane) = scene%body%inertia
       group%hinge_x(lane) = scene%body%hinge_x
@@ -120,7 +124,7 @@ contains
       group%base_force(lane, :) = 0.0_wp
       group%node_force(lane, :, :) = 0.0_wp
       if (.not. group%series) return
-      associate (n => scene%n, series => scene%hinges%series)
+      associate (n => scene%n, series => hinges%series)
          group%lower(lane, 1:n - 1) = series%lower
          group%pivot(lane, :) = series%pivot
          group%upper(lane, 0:n - 2) = series%upper

@@ -55,11 +55,12 @@ contains
       integer :: i
       logical :: ok
 
-      associate (r => motion%n_q, m => motion%n_dof, scene => motion%dynamics%scene, forces => motion%dynamics%forces)
-         call new_assembled_system(motion%system, scene, error) ! hinges may have changed since it was used last
+      associate (r => motion%n_q, m => motion%n_dof, scene => motion%dynamics%scene, hinges => motion%dynamics%hinges, &
+                 forces => motion%dynamics%forces)
+         call new_assembled_system(motion%system, scene, hinges, error) ! hinges may have changed since it was used last
          if (allocated(error)) return
          model%n_base = scene%n_base
-         moving = pack([(i, i=1, r - m)], .not. scene%hinges%locked(scene%hinges%relaxing))
+         moving = pack([(i, i=1, r - m)], .not. hinges%locked(hinges%relaxing))
          model%n_joints = size(moving)
          model%q = y(:r)
          model%p = y(r + 1:r + m)
@@ -78,19 +79,19 @@ contains
          model%gyration = by_state(:, r + 1:) - model%damping
          model%loaded = any(abs(forces%base) > 0.0_wp)
          if (motion%dynamics%regime%on_nodes) model%loaded = model%loaded .or. any(abs(forces%node) > 0.0_wp)
-         associate (law => scene%hinges)
+         associate (law => hinges)
             model%n_free_hinges = count(law%stiffness <= 0.0_wp .and. .not. law%locked)
             model%n_idle_hinges = count(law%stiffness <= 0.0_wp .and. law%damping <= 0.0_wp .and. .not. law%locked)
          end associate
-         model%kept = free_coordinates(scene)
+         model%kept = free_coordinates(scene, hinges)
          if (model%n_joints > 0) model%kept = [model%kept, m + moving]
          model%n = size(model%kept) - model%n_joints
          if (model%n_joints < r - m) then
             model%stiffness = model%stiffness(:, model%kept)
             model%joints = model%joints(moving, model%kept)
          end if
-         if (.not. has_slaves(scene)) return
-         model%expansion = expansion_matrix(scene)
+         if (.not. has_slaves(hinges)) return
+         model%expansion = expansion_matrix(scene, hinges)
       end associate
       call reduce_all(model)
    end subroutine new_linear_model

@@ -9,7 +9,7 @@ module rodyn_linearisation
    use rodyn_kinds, only: wp
    use rodyn_scene, only: scene_type
    use rodyn_bending_matrices, only: most_shapes
-   use rodyn_hinge_law, only: hinge_tangent
+   use rodyn_hinge_law, only: hinge_law, hinge_tangent
    implicit none (type, external)
    private
    public :: balance_tangent
@@ -17,8 +17,9 @@ module rodyn_linearisation
 contains
 
    !> dR in the direction (dq, dp).
-   pure subroutine balance_tangent(scene, q, p, a, loaded, node_force, dq, dp, dr)
+   pure subroutine balance_tangent(scene, hinges, q, p, a, loaded, node_force, dq, dp, dr)
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       real(wp), intent(in) :: q(:), p(:)   !! state (dof)
       real(wp), intent(in) :: a(:)         !! accelerations p' (dof), held fixed
       logical, intent(in) :: loaded        !! node_force is to be used
@@ -29,7 +30,7 @@ contains
       real(wp) :: moment(0:scene%n), work(0:scene%n - 1)
 
       associate (first => scene%n_base + 1)
-         call hinge_tangent(scene%hinges, scene%n, scene%dynamic_bending, dq(first:), dp(first:), work, moment)
+         call hinge_tangent(hinges, scene%n, scene%dynamic_bending, dq(first:), dp(first:), work, moment)
       end associate
       call outward_pass(scene, q, p, a, dq, dp, inner, d_inner)
       call inward_pass(scene, q, p, a, loaded, node_force, dq, dp, inner, d_inner, moment, dr)

@@ -39,6 +39,7 @@ module rodyn_motion
       integer :: n_q = 0               !! length of q
       logical :: free = .true.         !! the spacecraft moves
       logical :: ledger = .true.       !! y ends with work and dissipated energy
+      real(wp), allocatable :: switches(:) !! of the scene and of a load of the user's, increasing [s]
       type(event_set) :: events        !! what hinges do, and did
       real(wp), allocatable, private :: acceleration(:), joint_rate(:) !! workspace of `quadratures` (n_dof), (n_q - n_dof)
    contains
@@ -72,6 +73,7 @@ contains
       end if
       call new_dynamics(motion%dynamics, scene, error)
       if (allocated(error)) return
+      motion%switches = scene%switches
       motion%n_q = scene%n_q
       motion%n_dof = scene%n_dof
       motion%free = scene%n_base > 0
@@ -98,7 +100,7 @@ contains
             y(n_q + 1:n_q + 3) = [initial%velocity_x, initial%velocity_y, initial%omega]
          end if
          call place(scene%phi_at(), initial%phi, initial%phi_rate)
-         if (n_q > n_dof) call initial_joints(scene%hinges, y(scene%phi_at() + 1:scene%phi_at() + scene%n), &
+         if (n_q > n_dof) call initial_joints(motion%dynamics%hinges, y(scene%phi_at() + 1:scene%phi_at() + scene%n), &
                                              spread(0.0_wp, 1, scene%n), y(n_dof + 1:n_q))
          if (.not. scene%dynamic_bending) return
          call place(scene%alpha_at(), initial%alpha, initial%alpha_rate)
@@ -143,7 +145,7 @@ contains
             ydot(1) = ydot(1) + y(r + 3)*y(2)
             ydot(2) = ydot(2) - y(r + 3)*y(1)
          end if
-         if (r > m) call relaxation_rates(self%dynamics%scene%hinges, self%dynamics%work%moment, y(m + 1:r), ydot(m + 1:r))
+         if (r > m) call relaxation_rates(self%dynamics%hinges, self%dynamics%work%moment, y(m + 1:r), ydot(m + 1:r))
          if (size(ydot) > r + m) call powers(self, y(1:r), y(r + 1:r + m), ydot(m + 1:r), ydot(r + m + 1:))
       end associate
    end subroutine rhs
@@ -160,15 +162,15 @@ contains
                             self%dynamics%regime%on_nodes, self%dynamics%forces%node)
       if (self%dynamics%driven) power(1) = power(1) + drive_power(self, q, p)
       if (size(joint_rate) > 0) then
-         associate (d => self%dynamics%scene%hinges%damping, friction => self%dynamics%scene%hinges%friction, &
-                    relaxing => self%dynamics%scene%hinges%relaxing)
+         associate (d => self%dynamics%hinges%damping, friction => self%dynamics%hinges%friction, &
+                    relaxing => self%dynamics%hinges%relaxing)
             power(2) = 0.0_wp
             do i = 1, size(joint_rate)
                power(2) = power(2) + (d(relaxing(i))*joint_rate(i) + friction(relaxing(i)))*joint_rate(i)
             end do
          end associate
       else
-         call damper_power(self%dynamics%scene, p, self%dynamics%work%theta, power(2))
+         call damper_power(self%dynamics%scene, self%dynamics%hinges, p, self%dynamics%work%theta, power(2))
       end if
    end subroutine powers
 
@@ -181,7 +183,7 @@ contains
       call complete_moments(self, q, p)
       drive_power = 0.0_wp
       do k = 0, self%dynamics%scene%n - 1
-         drive_power = drive_power - self%dynamics%work%moment(k)*self%dynamics%scene%hinges%kink_rate(k)
+         drive_power = drive_power - self%dynamics%work%moment(k)*self%dynamics%hinges%kink_rate(k)
       end do
    end function drive_power
 
@@ -190,10 +192,11 @@ contains
       class(motion_type), intent(inout) :: self
       real(wp), contiguous, intent(in) :: q(:), p(:)
 
-      associate (scene => self%dynamics%scene, work => self%dynamics%work, first => self%dynamics%scene%n_base + 1)
-         if (has_slaves(scene)) work%theta(0:) = work%moment(:scene%n - 1)
-         call hinge_moments(scene%hinges, scene%n, scene%dynamic_bending, q(first:), p(first:), work%theta, work%moment)
-         if (has_slaves(scene)) work%moment(:scene%n - 1) = merge(work%theta(0:), work%moment(:scene%n - 1), scene%hinges%locked)
+      associate (scene => self%dynamics%scene, hinges => self%dynamics%hinges, work => self%dynamics%work, &
+                 first => self%dynamics%scene%n_base + 1)
+         if (has_slaves(hinges)) work%theta(0:) = work%moment(:scene%n - 1)
+         call hinge_moments(hinges, scene%n, scene%dynamic_bending, q(first:), p(first:), work%theta, work%moment)
+         if (has_slaves(hinges)) work%moment(:scene%n - 1) = merge(work%theta(0:), work%moment(:scene%n - 1), hinges%locked)
       end associate
    end subroutine complete_moments
 
@@ -214,8 +217,8 @@ contains
          call complete_moments(self, y(1:r), y(r + 1:r + m))
          moment = self%dynamics%work%moment(:scene%n - 1)
          associate (first => scene%n_base + 1)
-            call hinge_state(scene%hinges, scene%n, scene%dynamic_bending, y(first:r), y(r + first:r + m), theta, rate, at_rest, &
-                             moment_rate)
+            call hinge_state(self%dynamics%hinges, scene%n, scene%dynamic_bending, y(first:r), y(r + first:r + m), theta, rate, &
+                             at_rest, moment_rate)
          end associate
          angle = theta
       end associate
@@ -228,7 +231,7 @@ contains
       integer :: i
       has_lanes = self%n_q == self%n_dof
       do i = 1, self%n_events
-         associate (mechanism => self%dynamics%scene%hinges%mechanisms(self%events%mechanism(i)))
+         associate (mechanism => self%dynamics%hinges%mechanisms(self%events%mechanism(i)))
             has_lanes = has_lanes .and. mechanism%is_constrained()
          end associate
       end do
@@ -256,7 +259,7 @@ contains
       if (allocated(self%modes) .and. self%n_locks_of_modes /= self%dynamics%n_locks) deallocate (self%modes)
       if (.not. allocated(self%modes)) then
          allocate (self%modes)
-         call new_modes_finder(self%modes, self%dynamics%scene)
+         call new_modes_finder(self%modes, self%dynamics%scene, self%dynamics%hinges)
          self%n_locks_of_modes = self%dynamics%n_locks
       end if
       ok = .true.
@@ -268,7 +271,7 @@ contains
       end if
       associate (scene => self%dynamics%scene, work => self%dynamics%work)
          call sine_cosine(scene%n, q(scene%n_base + 1:scene%n_base + scene%n), work%sine(1:), work%cosine(1:))
-         call self%modes%find(scene, work%sine, work%cosine, q, slowest, weight, modes, ok)
+         call self%modes%find(scene, self%dynamics%hinges, work%sine, work%cosine, q, slowest, weight, modes, ok)
       end associate
    end subroutine find_modes
 
@@ -288,9 +291,9 @@ contains
 
       ok = .true.
       associate (dynamics => self%dynamics, r => self%n_q, m => self%n_dof, joint_rate => self%joint_rate)
-         if (r > m .or. (dynamics%driven .and. has_slaves(dynamics%scene))) then
+         if (r > m .or. (dynamics%driven .and. has_slaves(dynamics%hinges))) then
             call dynamics%accelerations(t, y(1:r), y(r + 1:r + m), self%acceleration, ok)
-            if (r > m) call relaxation_rates(dynamics%scene%hinges, dynamics%work%moment, y(m + 1:r), joint_rate)
+            if (r > m) call relaxation_rates(dynamics%hinges, dynamics%work%moment, y(m + 1:r), joint_rate)
          else if (dynamics%varying) then
             call dynamics%refresh(t, y(1:r), y(r + 1:r + m))
          end if
@@ -318,7 +321,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: lost, before
 
-      associate (hinges => self%dynamics%scene%hinges, r => self%n_q, m => self%n_dof)
+      associate (hinges => self%dynamics%hinges, r => self%n_q, m => self%n_dof)
          if (.not. (hinges%driven .or. self%events%watches)) then
             call self%dynamics%set_regime(t, t_to)
             if (self%ledger .and. .not. t > 0.0_wp) call begin_ledger(self, y)
@@ -413,7 +416,7 @@ contains
 
       self%dynamics%user => load
       if (.not. allocated(load%switches)) return
-      call add_switches(self%dynamics%scene%switches, pack(load%switches, load%switches > 0.0_wp))
+      call add_switches(self%switches, pack(load%switches, load%switches > 0.0_wp))
    end subroutine set_user_load
 
    !> Energies and momenta of a state.
@@ -422,7 +425,7 @@ contains
       real(wp), intent(in) :: y(:) !! (n_states)
       type(invariants_type) :: values
       associate (r => motion%n_q, m => motion%n_dof)
-         values = invariants(motion%dynamics%scene, y(:r), y(r + 1:r + m))
+         values = invariants(motion%dynamics%scene, motion%dynamics%hinges, y(:r), y(r + 1:r + m))
       end associate
    end function state_invariants
 
@@ -440,7 +443,7 @@ contains
 
       ok = .true.
       associate (r => self%n_q, m => self%n_dof, scene => self%dynamics%scene, work => self%dynamics%work)
-         if (.not. allocated(self%system%m)) call new_assembled_system(self%system, scene, error)
+         if (.not. allocated(self%system%m)) call new_assembled_system(self%system, scene, self%dynamics%hinges, error)
          if (.not. allocated(error)) call self%dynamics%accelerations(t, y(1:r), y(r + 1:r + m), a, ok)
          ok = ok .and. .not. allocated(error)
          if (.not. ok) return
@@ -463,8 +466,9 @@ contains
          direction = 0.0_wp
          do j = 1, size(by_state, 2)
             direction(j) = 1.0_wp
-            call balance_tangent(self%dynamics%scene, y(1:r), y(r + 1:r + m), a, self%dynamics%regime%on_nodes, &
-                                 self%dynamics%forces%node, direction(1:r), direction(r + 1:), by_state(:, j))
+            call balance_tangent(self%dynamics%scene, self%dynamics%hinges, y(1:r), y(r + 1:r + m), a, &
+                                 self%dynamics%regime%on_nodes, self%dynamics%forces%node, direction(1:r), direction(r + 1:), &
+                                 by_state(:, j))
             if (r > m .and. j <= r) call relaxation_column(self, direction(1:r), direction(r + 1:), joints(:, j))
             direction(j) = 0.0_wp
          end do
@@ -483,25 +487,25 @@ contains
       real(wp) :: still(0:self%dynamics%scene%n - 1)
       integer :: j, info
 
-      associate (r => self%n_q, m => self%n_dof, scene => self%dynamics%scene)
+      associate (r => self%n_q, m => self%n_dof, scene => self%dynamics%scene, hinges => self%dynamics%hinges)
          jac = 0.0_wp
          call differentiate_balance(self, t, y, a, change, joints, ok)
          if (.not. ok) return
          jac(m + 1:r, 1:r) = joints
-         if (has_slaves(scene)) then
-            call reduce_matrix(scene, 1.0_wp, self%system%m)
+         if (has_slaves(hinges)) then
+            call reduce_matrix(scene, hinges%locked, 1.0_wp, self%system%m)
             do j = 1, r + m
-               call reduce(scene, change(:, j))
+               call reduce(scene, hinges%locked, change(:, j))
             end do
          end if
          call dpotrf('L', m, self%system%m, m, info)
          ok = info == 0
          if (.not. ok) return
          call dpotrs('L', m, r + m, self%system%m, m, change, m, info)
-         if (has_slaves(scene)) then
+         if (has_slaves(hinges)) then
             still = 0.0_wp
             do j = 1, r + m
-               call expand(scene, scene%hinges%locked, still, change(:, j))
+               call expand(scene, hinges%locked, still, change(:, j))
             end do
          end if
          jac(r + 1:r + m, 1:r + m) = -change
@@ -537,17 +541,17 @@ contains
          if (fresh) then
             call self%dynamics%accelerations(t, y(1:r), y(r + 1:r + m), a, ok)
             if (.not. ok) return
-            call self%newton%linearise(scene, work%sine, work%cosine, y(1:r), y(r + 1:r + m), a, &
+            call self%newton%linearise(scene, self%dynamics%hinges, work%sine, work%cosine, y(1:r), y(r + 1:r + m), a, &
                                        self%dynamics%regime%on_nodes, self%dynamics%forces%node)
          end if
-         call self%newton%factorise(scene, gamma, ok)
+         call self%newton%factorise(scene, self%dynamics%hinges, gamma, ok)
       end associate
    end subroutine factorise_newton
 
    !> The O(n) factorisation knows neither locked hinges nor a third bending shape.
    pure logical function is_dense(self)
       class(motion_type), intent(in) :: self
-      is_dense = self%dynamics%scene%hinges%has_locks .or. self%dynamics%scene%n_bend == 3
+      is_dense = self%dynamics%hinges%has_locks .or. self%dynamics%scene%n_bend == 3
    end function is_dense
 
    !> x <- (1 - gamma J)^-1 x.
@@ -557,7 +561,7 @@ contains
       if (is_dense(self)) then
          call solve_dense(self, x)
       else
-         call self%newton%solve(self%dynamics%scene, x)
+         call self%newton%solve(self%dynamics%scene, self%dynamics%hinges, x)
       end if
    end subroutine solve_newton
 
@@ -568,9 +572,9 @@ contains
       real(wp), intent(out) :: column(:)
       real(wp) :: moment(0:self%dynamics%scene%n), work(0:self%dynamics%scene%n - 1)
 
-      associate (scene => self%dynamics%scene, first => self%dynamics%scene%n_base + 1)
-         call hinge_tangent(scene%hinges, scene%n, .false., dq(first:), dp(first:), work, moment)
-         call relaxation_tangent(scene%hinges, moment, dq(self%n_dof + 1:), column)
+      associate (scene => self%dynamics%scene, hinges => self%dynamics%hinges, first => self%dynamics%scene%n_base + 1)
+         call hinge_tangent(hinges, scene%n, .false., dq(first:), dp(first:), work, moment)
+         call relaxation_tangent(hinges, moment, dq(self%n_dof + 1:), column)
       end associate
    end subroutine relaxation_column
 

@@ -1,8 +1,8 @@
 !> Newton systems (1 - g J) x = r of the equations of motion, J = df/dy exact: O(n) time and memory for every scene.
 !>
-!>     call newton%linearise(scene, sine, cosine, q, p, a, loaded, node_force)  at a state
-!>     call newton%factorise(scene, gamma, ok)                                  for one g, as often as wanted
-!>     call newton%solve(scene, x)                                              for each right-hand side
+!>     call newton%linearise(scene, hinges, sine, cosine, q, p, a, loaded, node_force)  at a state
+!>     call newton%factorise(scene, hinges, gamma, ok)                          for one g, as often as wanted
+!>     call newton%solve(scene, hinges, x)                                      for each right-hand side
 !>
 !> The mass matrix is never inverted: with z the change of p', xp = rp + g z and xq = rq + g xp, and z solves the
 !> linearised balance of forces (`rodyn_newton_chain`, `rodyn_newton_series`, `rodyn_newton_root`).
@@ -10,7 +10,7 @@
 module rodyn_newton
    use rodyn_kinds, only: wp
    use rodyn_scene, only: scene_type
-   use rodyn_hinge_law, only: hinge_tangent, openings
+   use rodyn_hinge_law, only: hinge_law, hinge_tangent, openings
    use rodyn_three_moments, only: three_moments, new_three_moments
    use rodyn_newton_tangent, only: rod_tangent, linearise_rods
    use rodyn_newton_root, only: newton_root
@@ -46,16 +46,17 @@ module rodyn_newton
 contains
 
    !> Keep the derivatives at a state. Allocates at the first call.
-   subroutine linearise(self, scene, sine, cosine, q, p, a, loaded, node_force)
+   subroutine linearise(self, scene, hinges, sine, cosine, q, p, a, loaded, node_force)
       class(newton_type), intent(inout) :: self
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       real(wp), intent(in) :: sine(0:), cosine(0:) !! of phi (0:n); 0 and 1 at 0
       real(wp), intent(in) :: q(:), p(:)           !! state
       real(wp), intent(in) :: a(:)                 !! p' there
       logical, intent(in) :: loaded                !! node_force is to be used
       real(wp), intent(in) :: node_force(:, :)     !! X, Y at the nodes (2, n) [N]
 
-      if (.not. allocated(self%tangent)) call allocate_newton(self, scene)
+      if (.not. allocated(self%tangent)) call allocate_newton(self, scene, hinges)
       call linearise_rods(scene, sine, cosine, q, p, a, loaded, node_force, self%tangent)
       if (scene%n_base == 0) return
       self%root%velocity = p(1:2)
@@ -63,15 +64,16 @@ contains
       self%place = q(1:2)
    end subroutine linearise
 
-   subroutine allocate_newton(self, scene)
+   subroutine allocate_newton(self, scene, hinges)
       class(newton_type), intent(inout) :: self
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
 
       self%series = scene%quasistatic
       associate (n => scene%n)
          allocate (self%tangent(n), self%hinge(0:n - 1), self%moment(0:n), self%opening(0:n - 1))
-         allocate (self%damping(0:n - 1), source=scene%hinges%damping)
-         if (size(scene%hinges%relaxing) > 0) self%damping = 0.0_wp
+         allocate (self%damping(0:n - 1), source=hinges%damping)
+         if (size(hinges%relaxing) > 0) self%damping = 0.0_wp
          allocate (self%angle(scene%n_q), self%rate(scene%n_dof))
          if (self%series) then
             allocate (self%damped(n), self%left(5, n))
@@ -82,15 +84,16 @@ contains
    end subroutine allocate_newton
 
    !> Factor 1 - g J at the state of the last `linearise`.
-   subroutine factorise(self, scene, gamma, ok)
+   subroutine factorise(self, scene, hinges, gamma, ok)
       class(newton_type), intent(inout) :: self
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       real(wp), intent(in) :: gamma !! > 0 [s]
       logical, intent(out) :: ok    !! false: singular
       real(wp) :: apparent(3, 2), by_omega(3)
 
       self%gamma = gamma
-      associate (law => scene%hinges)
+      associate (law => hinges)
          if (self%series) then
             self%hinge = law%stiffness
             if (size(law%relaxing) > 0) then
@@ -112,9 +115,10 @@ contains
    end subroutine factorise
 
    !> x <- (1 - g J)^-1 x on the coordinates and rates; states behind them (quadratures) are not touched.
-   subroutine solve(self, scene, x)
+   subroutine solve(self, scene, hinges, x)
       class(newton_type), intent(inout) :: self
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       real(wp), intent(inout) :: x(:) !! (q, p, ...)
       real(wp) :: root_rate(3), z(3), known(3), acceleration(2)
 
@@ -127,26 +131,27 @@ contains
          if (scene%n_base > 0) root_rate = dp(1:3)
          z = 0.0_wp
          acceleration = 0.0_wp
-         call known_moments(self, scene)
+         call known_moments(self, scene, hinges)
          call inward(self, scene, root_rate(3), known)
          if (scene%n_base > 0) then
             known(3) = known(3) - self%moment(0)
             call self%root%solve(scene%body, root_rate, known, z, acceleration)
          end if
          call outward(self, scene, root_rate(3), z(3), acceleration)
-         call add_rods(self, scene, x(:n_q), x(n_q + 1:n_q + m))
+         call add_rods(self, scene, hinges%relaxing, x(:n_q), x(n_q + 1:n_q + m))
          if (scene%n_base > 0) call add_spacecraft(self, z, x(:n_q), x(n_q + 1:n_q + m))
       end associate
    end subroutine solve
 
    !> What the known changes alone do to the hinge moments. Relaxing hinges have T = (C + D/g) th - (D/g) r, with r in dq
    !> behind phi, and the rods' flexibility F gives (1 + F (C + D/g)) th = opening + F (D/g) r.
-   subroutine known_moments(self, scene)
+   subroutine known_moments(self, scene, hinges)
       class(newton_type), intent(inout) :: self
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       integer :: i, k
 
-      associate (law => scene%hinges, n => scene%n, f => scene%phi_at() + 1, pull => self%moment)
+      associate (law => hinges, n => scene%n, f => scene%phi_at() + 1, pull => self%moment)
          if (size(law%relaxing) == 0) then
             call hinge_tangent(law, n, scene%dynamic_bending, self%angle(f:), self%rate(f:), self%opening, self%moment)
             return
@@ -207,9 +212,10 @@ contains
    end subroutine outward
 
    !> The rods' part of the solution, and the relaxing hinges'.
-   pure subroutine add_rods(self, scene, xq, xp)
+   pure subroutine add_rods(self, scene, relaxing, xq, xp)
       class(newton_type), intent(in) :: self
       type(scene_type), intent(in) :: scene
+      integer, intent(in) :: relaxing(:)
       real(wp), intent(inout) :: xq(:), xp(:)
       integer :: first, group, i, k
 
@@ -221,8 +227,8 @@ contains
             xq(i) = self%angle(i) + self%gamma**2*self%left(group, k)
          end do
       end do
-      do i = 1, size(scene%hinges%relaxing)
-         k = scene%hinges%relaxing(i)
+      do i = 1, size(relaxing)
+         k = relaxing(i)
          xq(scene%n_dof + i) = self%opening(k) + self%gamma**2*self%left(of_opening, k + 1)
       end do
    end subroutine add_rods

@@ -215,7 +215,7 @@ contains
          f = merge(1, 0, motion%free)       ! and of each coordinate of the spacecraft
          row%time = t
          row%next = 1
-         call slopes(scene, q, p, slope(:, 1), slope(:, 2), slope(:, 3), slope(:, 4))
+         call slopes(scene, motion%dynamics%hinges, q, p, slope(:, 1), slope(:, 2), slope(:, 3), slope(:, 4))
          call put(row, 'phi', q(scene%phi_at() + 1:scene%phi_at() + n))
          call put(row, 'alpha', slope(:, 1))
          call put(row, 'beta', slope(:, 2))
@@ -231,7 +231,7 @@ contains
          call put(row, 'displacement_y', q(2:1 + f))
          call put(row, 'rotation', q(3:2 + f))
          if (row%layout%has(ledger)) then
-            now = invariants(scene, q, p)
+            now = invariants(scene, motion%dynamics%hinges, q, p)
             call put(row, 'energy_kinetic', [now%kinetic])
             call put(row, 'energy_elastic', [now%elastic])
             call put(row, 'energy_dissipated', sums(2:2))

@@ -10,6 +10,7 @@ module rodyn_scene_modes
    use rodyn_errors, only: error_type
    use rodyn_stiff_modes, only: stiff_modes
    use rodyn_scene, only: scene_type
+   use rodyn_hinge_law, only: hinge_law
    use rodyn_assembled, only: assembled_system, new_assembled_system, mass_matrix
    use rodyn_locks, only: has_slaves, reduce, expand, reduce_matrix
    use rodyn_orthogonal_columns, only: column_rotator
@@ -43,16 +44,17 @@ module rodyn_scene_modes
 contains
 
    !> Gather what stays constant.
-   subroutine new_modes_finder(finder, scene)
+   subroutine new_modes_finder(finder, scene, hinges)
       type(modes_finder), intent(out) :: finder
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       type(error_type), allocatable :: error
 
       if (scene%n_dof > most_dof) return
-      call new_assembled_system(finder%system, scene, error)
+      call new_assembled_system(finder%system, scene, hinges, error)
       if (allocated(error)) return
       allocate (finder%work(scene%n_dof))
-      call first_weight(finder, scene)
+      call first_weight(finder, hinges)
       call factor_dampers(finder)
       call factor(finder, finder%least_weight)
       finder%first = finder%columns(scene%n_dof + 1:, :)
@@ -60,15 +62,15 @@ contains
    end subroutine new_modes_finder
 
    !> Relaxation times of the dampers, and a weight so small that it only makes room for what nothing but dampers hold.
-   subroutine first_weight(self, scene)
+   subroutine first_weight(self, hinges)
       type(modes_finder), intent(inout) :: self
-      type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       real(wp), parameter :: small = 1.0e-3_wp
       real(wp) :: time, longest !! relaxation of a damper by its spring; the longest [s]
       integer :: k
 
       longest = 0.0_wp
-      associate (stiffness => scene%hinges%stiffness, damping => scene%hinges%damping, locked => scene%hinges%locked)
+      associate (stiffness => hinges%stiffness, damping => hinges%damping, locked => hinges%locked)
          do k = lbound(damping, 1), ubound(damping, 1)
             if (locked(k) .or. .not. damping(k) > 0.0_wp) cycle
             time = damping(k)/max(stiffness(k), epsilon(1.0_wp)*damping(k))
@@ -139,9 +141,10 @@ contains
    end subroutine forget
 
    !> Modes at q that are faster than `slowest`, for a weight of dampers. Not `ok`: M is not positive definite.
-   subroutine find(self, scene, sine, cosine, q, slowest, weight, modes, ok)
+   subroutine find(self, scene, hinges, sine, cosine, q, slowest, weight, modes, ok)
       class(modes_finder), intent(inout) :: self
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       real(wp), intent(in) :: sine(0:), cosine(0:) !! of phi (0:n)
       real(wp), intent(in) :: q(:)                 !! (n_dof)
       real(wp), intent(in) :: slowest              !! [rad/s]
@@ -158,9 +161,9 @@ contains
       call mass_matrix(self%system, scene, sine, cosine, q)
       do i = 1, rank
          self%columns(:m, i) = self%columns(m + 1:, i)
-         if (has_slaves(scene)) call reduce(scene, self%columns(:m, i))
+         if (has_slaves(hinges)) call reduce(scene, hinges%locked, self%columns(:m, i))
       end do
-      if (has_slaves(scene)) call reduce_matrix(scene, 1.0_wp, self%system%m)
+      if (has_slaves(hinges)) call reduce_matrix(scene, hinges%locked, 1.0_wp, self%system%m)
       call dpotrf('L', m, self%system%m, m, info)
       ok = info == 0
       if (.not. ok) return
@@ -170,10 +173,10 @@ contains
       call self%rotator%orthogonalise(self%columns, m, slowest**2, merge(damped_negligible, negligible, &
                                       self%weight*self%relaxation > little), self%squares)
       call dtrsm('L', 'L', 'T', 'N', m, rank, 1.0_wp, self%system%m, m, self%columns, 2*m)
-      if (has_slaves(scene)) then
+      if (has_slaves(hinges)) then
          self%work(:) = 0.0_wp
          do i = 1, rank
-            call expand(scene, scene%hinges%locked, self%work(:scene%n), self%columns(:m, i))
+            call expand(scene, hinges%locked, self%work(:scene%n), self%columns(:m, i))
          end do
       end if
       call keep_fast_modes(self, scene%n_base, slowest, modes)

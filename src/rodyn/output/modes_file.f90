@@ -9,6 +9,7 @@ module rodyn_modes_file
    use rodyn_linear_model, only: linear_model
    use rodyn_modes, only: mode_set
    use rodyn_result_file, only: provenance, result_file
+   use rodyn_hinge_law, only: hinge_law
    use rodyn_scene, only: scene_type
    use rodyn_text, only: to_text
    implicit none (type, external)
@@ -22,11 +23,12 @@ module rodyn_modes_file
 contains
 
    !> Write everything and give the file its name.
-   subroutine write_modes(path, force, origin, scene, model, modes, equilibrium, error)
+   subroutine write_modes(path, force, origin, scene, hinges, model, modes, equilibrium, error)
       character(len=*), intent(in) :: path
       logical, intent(in) :: force             !! replace an existing file
       type(provenance), intent(in) :: origin
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       type(linear_model), intent(in) :: model
       type(mode_set), intent(in) :: modes      !! with shapes
       logical, intent(in) :: equilibrium       !! the state was sought as one
@@ -39,7 +41,7 @@ contains
       call file%write_provenance(origin, error)
       if (.not. allocated(error)) call write_axes()
       if (.not. allocated(error)) call write_eigenvalues()
-      if (.not. allocated(error)) call write_shapes(file, scene, model, modes, error)
+      if (.not. allocated(error)) call write_shapes(file, scene, hinges, model, modes, error)
       if (.not. allocated(error)) call write_state()
       if (.not. allocated(error)) call write_matrices()
       if (.not. allocated(error)) call write_summary()
@@ -108,7 +110,7 @@ contains
                            error)
          call write_vector(file, 'state_acceleration', model%acceleration(model%kept(:model%n)), 'rate', &
                            'm s-2 or rad s-2', 'rates of these rates', error)
-         call write_configuration(file, scene, model, error)
+         call write_configuration(file, scene, hinges, model, error)
       end subroutine write_state
 
       subroutine write_matrices()
@@ -136,14 +138,15 @@ contains
    end subroutine write_modes
 
    !> All of the state, with what locked hinges make redundant, slopes without inertia, and the hinges.
-   subroutine write_configuration(file, scene, model, error)
+   subroutine write_configuration(file, scene, hinges, model, error)
       type(result_file), intent(in) :: file
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       type(linear_model), intent(in) :: model
       type(error_type), allocatable, intent(inout) :: error
       real(wp), dimension(scene%n) :: alpha, beta, alpha_rate, beta_rate
 
-      call slopes(scene, model%q, model%p, alpha, beta, alpha_rate, beta_rate)
+      call slopes(scene, hinges, model%q, model%p, alpha, beta, alpha_rate, beta_rate)
       if (scene%n_base > 0 .and. .not. allocated(error)) then
          call file%file%put_attribute('/', 'state_displacement_x', model%q(1), error)
          if (.not. allocated(error)) call file%file%put_attribute('/', 'state_displacement_y', model%q(2), error)
@@ -218,9 +221,10 @@ contains
    end function coordinate_names
 
    !> The shapes, one coordinate after the other; what the scene has not is zero, and slopes without inertia follow.
-   subroutine write_shapes(file, scene, model, modes, error)
+   subroutine write_shapes(file, scene, hinges, model, modes, error)
       type(result_file), intent(in) :: file
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       type(linear_model), intent(in) :: model
       type(mode_set), intent(in) :: modes
       type(error_type), allocatable, intent(out) :: error
@@ -231,7 +235,7 @@ contains
       if (scene%n_base > 0) place = transpose(modes%shape(:3, :))
       allocate (alpha(scene%n, modes%n), beta(scene%n, modes%n))
       do i = 1, modes%n
-         call slope_shapes(scene, size(model%p), modes%shape(:, i), alpha(:, i), beta(:, i))
+         call slope_shapes(scene, hinges, size(model%p), modes%shape(:, i), alpha(:, i), beta(:, i))
       end do
       call scalar('displacement_x', place(:, 1), 'm', 'displacement of the spacecraft, moving x axis')
       call scalar('displacement_y', place(:, 2), 'm', 'displacement of the spacecraft, moving y axis')
@@ -295,8 +299,9 @@ contains
    end subroutine write_table
 
    !> Slopes that go with a change of q: they are affine in it.
-   subroutine slope_shapes(scene, n_p, shape, alpha, beta)
+   subroutine slope_shapes(scene, hinges, n_p, shape, alpha, beta)
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       integer, intent(in) :: n_p
       complex(wp), intent(in) :: shape(:)
       complex(wp), intent(out) :: alpha(:), beta(:)
@@ -304,9 +309,9 @@ contains
       real(wp) :: rates(n_p), unused(scene%n), also_unused(scene%n)
 
       rates = 0.0_wp
-      call slopes(scene, spread(0.0_wp, 1, size(shape)), rates, a(:, 3), b(:, 3), unused, also_unused)
-      call slopes(scene, real(shape, wp), rates, a(:, 1), b(:, 1), unused, also_unused)
-      call slopes(scene, aimag(shape), rates, a(:, 2), b(:, 2), unused, also_unused)
+      call slopes(scene, hinges, spread(0.0_wp, 1, size(shape)), rates, a(:, 3), b(:, 3), unused, also_unused)
+      call slopes(scene, hinges, real(shape, wp), rates, a(:, 1), b(:, 1), unused, also_unused)
+      call slopes(scene, hinges, aimag(shape), rates, a(:, 2), b(:, 2), unused, also_unused)
       alpha = cmplx(a(:, 1) - a(:, 3), a(:, 2) - a(:, 3), wp)
       beta = cmplx(b(:, 1) - b(:, 3), b(:, 2) - b(:, 3), wp)
    end subroutine slope_shapes

@@ -59,9 +59,9 @@ contains
       origin%resolved_input = resolved_case(config)
       origin%sundials_version = sundials_version()
       if (present(input_text)) origin%input = input_text
-      associate (scene => setup%motion%dynamics%scene)
-         origin%notes = joined_lines(case_notes(config, .false.), notes_on(scene, model%q(:scene%n_dof), .false.))
-         call write_modes(path, replace, origin, scene, model, modes, equilibrium, error)
+      associate (scene => setup%motion%dynamics%scene, hinges => setup%motion%dynamics%hinges)
+         origin%notes = joined_lines(case_notes(config, .false.), notes_on(scene, hinges, model%q(:scene%n_dof), .false.))
+         call write_modes(path, replace, origin, scene, hinges, model, modes, equilibrium, error)
       end associate
       if (allocated(error) .or. silent) return
       call print_table(modes)

@@ -2,6 +2,7 @@
 module rodyn_notes
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
+   use rodyn_hinge_law, only: hinge_law
    use rodyn_scene, only: scene_type
    use rodyn_frequencies, only: natural_frequencies
    use rodyn_switch_times, only: same_time
@@ -17,8 +18,9 @@ module rodyn_notes
 contains
 
    !> One line for each note, without a closing newline; empty if there is nothing to say.
-   function notes_on(scene, q, ledger) result(text)
+   function notes_on(scene, hinges, q, ledger) result(text)
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       real(wp), intent(in) :: q(:)    !! coordinates at the start (dof)
       logical, intent(in) :: ledger   !! energies are recorded
       character(len=:), allocatable :: text
@@ -36,7 +38,7 @@ contains
                    "after = 'hold' holds its last value"
          end associate
       end do
-      call neglected_damping(scene, q, term, hinge, frequency)
+      call neglected_damping(scene, hinges, q, term, hinge, frequency)
       if (.not. term > least_neglected) return
       if (len(text) > 0) text = text//new_line('a')
       if (term > huge(term)) then
@@ -50,8 +52,9 @@ contains
 
    !> Largest (D w/C)^2 of the hinges, w the highest natural frequency, docs/model.md sec. 5: the relative size of what
    !> quasistatic bending with reduced dampers leaves out. Zero where nothing is left out or nobody looks.
-   subroutine neglected_damping(scene, q, term, hinge, frequency)
+   subroutine neglected_damping(scene, hinges, q, term, hinge, frequency)
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       real(wp), intent(in) :: q(:)       !! coordinates (dof)
       real(wp), intent(out) :: term      !! infinite for a damper without a spring
       integer, intent(out) :: hinge      !! where it is largest, 0..n-1
@@ -63,12 +66,12 @@ contains
       term = 0.0_wp
       hinge = 0
       frequency = 0.0_wp
-      if (.not. (scene%quasistatic .and. scene%hinges%has_damping) .or. scene%n_dof > most_dof) return
-      if (size(scene%hinges%relaxing) > 0) return
-      call natural_frequencies(scene, q, frequencies, error)
+      if (.not. (scene%quasistatic .and. hinges%has_damping) .or. scene%n_dof > most_dof) return
+      if (size(hinges%relaxing) > 0) return
+      call natural_frequencies(scene, hinges, q, frequencies, error)
       if (allocated(error)) return
       frequency = maxval(frequencies)
-      associate (c => scene%hinges%stiffness, d => scene%hinges%damping)
+      associate (c => hinges%stiffness, d => hinges%damping)
          do k = 0, scene%n - 1
             if (.not. size_of(d(k), c(k)) > term) cycle
             term = size_of(d(k), c(k))

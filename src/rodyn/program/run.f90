@@ -86,8 +86,8 @@ contains
       call new_driver(driver, setup%motion, setup%y, config%solver, config%t_end, config%n_outputs, error, progress)
       if (allocated(error) .and. present(name)) error%message = name//': '//error%message
       if (allocated(error)) return
-      associate (scene => setup%motion%dynamics%scene)
-         notes = joined_lines(case_notes(config, .true.), notes_on(scene, setup%y(:scene%n_dof), config%output%ledger))
+      associate (scene => setup%motion%dynamics%scene, hinges => setup%motion%dynamics%hinges)
+         notes = joined_lines(case_notes(config, .true.), notes_on(scene, hinges, setup%y(:scene%n_dof), config%output%ledger))
          if (.not. silent) call print_line(describe_scene(scene, config%output%ledger))
       end associate
       if (.not. silent) call print_line('method  '//driver%methods()//': '//driver%reason())

@@ -42,7 +42,7 @@ module rodyn_scene
       type(rod_constants), allocatable :: rods(:) !! the distinct rods
       type(bending_matrices), allocatable :: bending(:) !! their matrices over the bending coordinates
       integer, allocatable :: rod_of(:)        !! which of them is rod k (1:n)
-      type(hinge_law) :: hinges
+      type(hinge_law) :: hinges                !! laws as a run finds them; those of the moment are the motion's
       type(load_set) :: loads
       type(kink_set) :: kinks
       real(wp), allocatable :: switches(:)     !! times within the run where a force, kink or lock is not smooth, increasing [s]

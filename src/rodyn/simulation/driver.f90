@@ -132,7 +132,7 @@ contains
 
       begun = self%motion
       state = y
-      call begun%begin_regime(0.0_wp, min(self%t_end, minval(begun%dynamics%scene%switches)), self%t_end, state, error)
+      call begun%begin_regime(0.0_wp, min(self%t_end, minval(begun%switches)), self%t_end, state, error)
       if (.not. allocated(error)) call judge(self, begun, 0.0_wp, state, self%choice, self%now)
    end subroutine choose_first
 
@@ -190,7 +190,7 @@ contains
       real(wp), intent(in) :: t
       integer :: i
       next_release = huge(1.0_wp)
-      associate (mechanisms => motion%dynamics%scene%hinges%mechanisms)
+      associate (mechanisms => motion%dynamics%hinges%mechanisms)
          do i = 1, size(mechanisms)
             if (mechanisms(i)%locked .and. mechanisms(i)%release_time > t) &
                next_release = min(next_release, mechanisms(i)%release_time)
@@ -203,9 +203,9 @@ contains
       type(motion_type), intent(in) :: motion
       integer, allocatable :: laws(:)
       integer :: i
-      allocate (laws(size(motion%dynamics%scene%hinges%mechanisms)))
+      allocate (laws(size(motion%dynamics%hinges%mechanisms)))
       do i = 1, size(laws)
-         associate (law => motion%dynamics%scene%hinges%mechanisms(i))
+         associate (law => motion%dynamics%hinges%mechanisms(i))
             laws(i) = merge(1, 0, law%locked) + merge(2, 0, law%side /= 0) + merge(4, 0, law%touches(1)) + &
                       merge(8, 0, law%touches(2)) + merge(16, 0, law%slides /= 0)
          end associate
@@ -527,7 +527,7 @@ contains
       type(driver_type), intent(inout) :: self
       effort_of_member = 0.0_wp
       if (.not. allocated(self%members(self%now)%integrator)) return
-      effort_of_member = effort_of(self%name(self%now), self%motion%dynamics%scene, &
+      effort_of_member = effort_of(self%name(self%now), self%motion%dynamics, &
                                    self%members(self%now)%integrator%statistics())
    end function effort_of_member
 

@@ -152,7 +152,7 @@ contains
       class(ensemble_member), pointer, intent(inout) :: member
 
       ensemble%seats(lane)%member => member
-      member%ends = interval_ends(member%motion%dynamics%scene%switches, member%t_end)
+      member%ends = interval_ends(member%motion%switches, member%t_end)
       member%t = 0.0_wp
       member%segment = 1
       member%next = 1

@@ -10,7 +10,7 @@ module rodyn_method_choice
    use rodyn_kinds, only: wp
    use rodyn_text, only: to_text, formatted, time_text
    use rodyn_motion, only: motion_type
-   use rodyn_scene, only: scene_type
+   use rodyn_accelerations, only: dynamics_type
    use rodyn_scene_modes, only: most_dof
    use rodyn_fastest_rates, only: fastest_rates, with_rigid_rods
    use rodyn_integrator, only: monitor_type, solver_options
@@ -67,15 +67,16 @@ contains
       span = t_end - t
       available = [.not. out(1), .not. out(2) .and. motion%has_lanes()]
       associate (scene => motion%dynamics%scene, rates => choice%rates)
-         call fastest_rates(scene, y(:scene%n_q), rates%frequency, rates%decay)
+         call fastest_rates(scene, motion%dynamics%hinges, y(:scene%n_q), rates%frequency, rates%decay)
          choice%steps = expected_steps('dop853', options, rates, span)
          ratio = 1.0_wp
-         outputs = [(n_outputs*effort_of_output(candidates(i)%method, scene), i=1, size(candidates))]
-         expected = expected_efforts(scene, options, rates, ratio, span, available)
+         outputs = [(n_outputs*effort_of_output(candidates(i)%method, motion%dynamics), i=1, size(candidates))]
+         expected = expected_efforts(motion%dynamics, options, rates, ratio, span, available)
          if (minval(expected + outputs(:n_even)) >= short_run) then
-            call fastest_rates(with_rigid_rods(scene), y(:scene%n_base + scene%n + scene%n_q - scene%n_dof), rates%slow)
+            call fastest_rates(with_rigid_rods(scene), motion%dynamics%hinges, &
+                               y(:scene%n_base + scene%n + scene%n_q - scene%n_dof), rates%slow)
             if (rates%slow > 0.0_wp) ratio = max(rates%frequency, rates%decay)/rates%slow
-            expected = expected_efforts(scene, options, rates, ratio, span, available)
+            expected = expected_efforts(motion%dynamics, options, rates, ratio, span, available)
          end if
          best = minloc(expected + outputs(:n_even), dim=1)
          if (needs_no_trial(any(available), expected(best), outputs(best), ratio, options%rtol, rates)) then
@@ -85,7 +86,7 @@ contains
             choice%steps = expected_steps('gauss', options, rates, span)
             return
          end if
-         call try_methods(motion, y, t, options, minval([t_end, pack(scene%switches, scene%switches > t)]), t_end, rates, &
+         call try_methods(motion, y, t, options, minval([t_end, pack(motion%switches, motion%switches > t)]), t_end, rates, &
                           expected, vibrating(rates, span)*span, out, most_trial, forecast, choice%effort, choice%conclusive, &
                           monitor)
       end associate
@@ -159,8 +160,8 @@ contains
    !> Efforts of explicit steps of order 8 and of collocation, by their steps (docs/performance.md). What the fast vibrations add
    !> to the motion of the chain is nearly linear, so the faster they are, the fewer iterations a step of collocation needs.
    !> It is out of the question (huge) where it has no lanes or modes, hinges may have events, or nothing vibrates.
-   function expected_efforts(scene, options, rates, ratio, t_end, available) result(effort)
-      type(scene_type), intent(in) :: scene
+   function expected_efforts(dynamics, options, rates, ratio, t_end, available) result(effort)
+      type(dynamics_type), intent(in) :: dynamics
       type(solver_options), intent(in) :: options
       type(fast_rates), intent(in) :: rates
       real(wp), intent(in) :: ratio !! fastest rate over the frequencies of the chain; 1: unknown, or rods are rigid
@@ -171,14 +172,14 @@ contains
 
       effort = huge(1.0_wp)
       if (available(1)) effort(1) = explicit_step*expected_steps('dop853', options, rates, t_end)
-      if (.not. available(2) .or. scene%assembled .or. scene%n_dof > most_dof) return
+      if (.not. available(2) .or. dynamics%scene%assembled .or. dynamics%scene%n_dof > most_dof) return
       if (.not. rates%frequency > 0.0_wp) return
       iterations = 4.5_wp
       if (ratio > 1.0_wp) iterations = max(1.2_wp, 8.0_wp*ratio**(-0.2_wp))
       if (vibrating(rates, t_end) < 1.0_wp) iterations = damped_iterations(rates, options%rtol)
-      effort(2) = (effort_of_step(scene) + iterations*effort_of_nodes(scene))*expected_steps('gauss', options, rates, t_end)
-      if (rates%decay > coupling_decay*rates%frequency) effort(2) = effort(2)*(1.0_wp + effort_of_coupling(scene))
-      effort(2) = effort(2) + effort_of_modes(scene, merge(4, 2, vibrating(rates, t_end) < 1.0_wp))
+      effort(2) = (effort_of_step(dynamics) + iterations*effort_of_nodes(dynamics))*expected_steps('gauss', options, rates, t_end)
+      if (rates%decay > coupling_decay*rates%frequency) effort(2) = effort(2)*(1.0_wp + effort_of_coupling(dynamics))
+      effort(2) = effort(2) + effort_of_modes(dynamics, merge(4, 2, vibrating(rates, t_end) < 1.0_wp))
    end function expected_efforts
 
    !> Iterations of a collocation step where dampers calm the vibrations, which allows longer steps: a fit to 190 measured scenes,

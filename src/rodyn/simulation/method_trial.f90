@@ -8,7 +8,7 @@ module rodyn_method_trial
    use rodyn_lane_scene, only: suits_lanes
    use rodyn_lanes, only: lanes
    use rodyn_locks, only: has_slaves
-   use rodyn_scene, only: scene_type
+   use rodyn_accelerations, only: dynamics_type
    use rodyn_motion, only: motion_type
    use rodyn_integrator, only: integrator_type, monitor_type, solver_options, solver_statistics
    use rodyn_integrators, only: new_integrator
@@ -84,73 +84,75 @@ contains
 
    !> Effort of a run: that of one right-hand side of `dop853` is 1. Beside right-hand sides, an implicit step solves as often,
    !> which takes as long, has a new Jacobian or factors now and then, and adds vectors: 2, and what does not grow with n.
-   pure real(wp) function effort_of(method, scene, stats)
+   pure real(wp) function effort_of(method, dynamics, stats)
       character(len=*), intent(in) :: method
-      type(scene_type), intent(in) :: scene
+      type(dynamics_type), intent(in) :: dynamics
       type(solver_statistics), intent(in) :: stats
       effort_of = real(stats%n_rhs, wp)
-      if (method == 'gauss') effort_of = effort_of_modes(scene, int(stats%n_jac)) + &
-                                         (real(stats%n_rhs, wp)/real(lanes, wp)*effort_of_nodes(scene) + &
-                                          effort_of_step(scene)*real(stats%n_steps, wp)) &
-                                         *(1.0_wp + effort_of_coupling(scene)*stats%n_coupled/max(1.0_wp, real(stats%n_rhs, wp)))
-      if (method == 'bdf') effort_of = 2.1_wp*real(stats%n_rhs, wp) + effort_of_jacobian(scene)*real(stats%n_jac, wp) + &
-                                       real(stats%n_steps, wp)*(2.1_wp + 15.0_wp/(1.0_wp + 0.37_wp*scene%n))/rhs_cost(scene)
+      if (method == 'gauss') effort_of = effort_of_modes(dynamics, int(stats%n_jac)) + &
+                                         (real(stats%n_rhs, wp)/real(lanes, wp)*effort_of_nodes(dynamics) + &
+                                          effort_of_step(dynamics)*real(stats%n_steps, wp)) &
+                                         *(1.0_wp + effort_of_coupling(dynamics)*stats%n_coupled/max(1.0_wp, real(stats%n_rhs, wp)))
+      if (method == 'bdf') effort_of = 2.1_wp*real(stats%n_rhs, wp) + effort_of_jacobian(dynamics)*real(stats%n_jac, wp) + &
+                                       real(stats%n_steps, wp)*(2.1_wp + 15.0_wp/(1.0_wp + 0.37_wp*dynamics%scene%n)) &
+                                       /rhs_cost(dynamics)
    end function effort_of
 
    !> Time of a right-hand side over that of an ordinary chain. Locked hinges and third bending shapes have a recursion of their own
    !> (measured for chains of 4 to 64 rods that bend, all hinges held: 2.6 to 5.9).
-   pure real(wp) function rhs_cost(scene)
-      type(scene_type), intent(in) :: scene
-      rhs_cost = merge(4.5_wp, 1.0_wp, joins(scene))
+   pure real(wp) function rhs_cost(dynamics)
+      type(dynamics_type), intent(in) :: dynamics
+      rhs_cost = merge(4.5_wp, 1.0_wp, joins(dynamics))
    end function rhs_cost
 
    !> Locked hinges or third bending shapes?
-   pure logical function joins(scene)
-      type(scene_type), intent(in) :: scene
-      joins = has_slaves(scene) .or. scene%n_bend == 3
+   pure logical function joins(dynamics)
+      type(dynamics_type), intent(in) :: dynamics
+      joins = has_slaves(dynamics%hinges) .or. dynamics%scene%n_bend == 3
    end function joins
 
    !> Effort of one iteration of a collocation step: eight right-hand sides, in lanes where they can, and the stiff modes, whose
    !> cost grows with the square of the number of unknowns (measured from 6 to 195 of them).
-   pure real(wp) function effort_of_nodes(scene)
-      type(scene_type), intent(in) :: scene
-      effort_of_nodes = merge(2.0_wp, real(lanes, wp), suits_lanes(scene)) + (1.4_wp + 0.055_wp*scene%n_dof)/rhs_cost(scene)
+   pure real(wp) function effort_of_nodes(dynamics)
+      type(dynamics_type), intent(in) :: dynamics
+      effort_of_nodes = merge(2.0_wp, real(lanes, wp), suits_lanes(dynamics%scene, dynamics%hinges)) + &
+                        (1.4_wp + 0.055_wp*dynamics%scene%n_dof)/rhs_cost(dynamics)
    end function effort_of_nodes
 
    !> Effort of a collocation step beside its iterations.
-   pure real(wp) function effort_of_step(scene)
-      type(scene_type), intent(in) :: scene
-      effort_of_step = 4.0_wp/rhs_cost(scene)
+   pure real(wp) function effort_of_step(dynamics)
+      type(dynamics_type), intent(in) :: dynamics
+      effort_of_step = 4.0_wp/rhs_cost(dynamics)
    end function effort_of_step
 
    !> What coupled modes add to steps and iterations, times these: their equations, and more modes to be found more precisely
    !> (measured for 15, 51 and 195 unknowns: 0.3, 0.8 and 2).
-   pure real(wp) function effort_of_coupling(scene)
-      type(scene_type), intent(in) :: scene
-      effort_of_coupling = 0.05_wp*real(scene%n_dof, wp)**0.7_wp/rhs_cost(scene)
+   pure real(wp) function effort_of_coupling(dynamics)
+      type(dynamics_type), intent(in) :: dynamics
+      effort_of_coupling = 0.05_wp*real(dynamics%scene%n_dof, wp)**0.7_wp/rhs_cost(dynamics)
    end function effort_of_coupling
 
    !> Effort of a Jacobian with its factors: O(n), and dense where hinges are locked or rods have a third bending shape.
-   pure real(wp) function effort_of_jacobian(scene)
-      type(scene_type), intent(in) :: scene
-      effort_of_jacobian = merge(8.0_wp*scene%n, 3.0_wp, joins(scene))
+   pure real(wp) function effort_of_jacobian(dynamics)
+      type(dynamics_type), intent(in) :: dynamics
+      effort_of_jacobian = merge(8.0_wp*dynamics%scene%n, 3.0_wp, joins(dynamics))
    end function effort_of_jacobian
 
    !> Effort of a state between steps: a shorter step, whose first guess collocation knows, so that one or two iterations are
    !> enough; BDF has a polynomial.
-   pure real(wp) function effort_of_output(method, scene)
+   pure real(wp) function effort_of_output(method, dynamics)
       character(len=*), intent(in) :: method
-      type(scene_type), intent(in) :: scene
+      type(dynamics_type), intent(in) :: dynamics
       effort_of_output = 11.0_wp
-      if (method == 'gauss') effort_of_output = 1.5_wp*effort_of_nodes(scene) + 0.3_wp*scene%n_dof/rhs_cost(scene)
-      if (method == 'bdf') effort_of_output = 1.5_wp/rhs_cost(scene)
+      if (method == 'gauss') effort_of_output = 1.5_wp*effort_of_nodes(dynamics) + 0.3_wp*dynamics%scene%n_dof/rhs_cost(dynamics)
+      if (method == 'bdf') effort_of_output = 1.5_wp/rhs_cost(dynamics)
    end function effort_of_output
 
    !> Effort of finding the modes so many times: the first has no guess.
-   pure real(wp) function effort_of_modes(scene, times)
-      type(scene_type), intent(in) :: scene
+   pure real(wp) function effort_of_modes(dynamics, times)
+      type(dynamics_type), intent(in) :: dynamics
       integer, intent(in) :: times
-      effort_of_modes = (0.4_wp*real(scene%n_dof, wp)**2 + 6.0_wp*scene%n_dof*times)/rhs_cost(scene)
+      effort_of_modes = (0.4_wp*real(dynamics%scene%n_dof, wp)**2 + 6.0_wp*dynamics%scene%n_dof*times)/rhs_cost(dynamics)
    end function effort_of_modes
 
    !> Effort that each candidate would need from `t` to `t_end`, huge if it fails. An implicit method may creep at first,
@@ -230,7 +232,7 @@ contains
       !> counts once they are calm; before, it is the least to be expected.
       subroutine follow_collocation()
          if (.not. expected(2) < huge(1.0_wp)) return
-         if (.not. t_quiet < t_end .or. runners(2)%failed .or. effort_of_modes(motion%dynamics%scene, 2) > allowed) return
+         if (.not. t_quiet < t_end .or. runners(2)%failed .or. effort_of_modes(motion%dynamics, 2) > allowed) return
          if (expected(2)/expectation_error > minval(forecast(n_even + 1:))) return
          call continue_runner(runners(2), candidates(2), motion, y, options, t_first, allowed, listener)
          forecast(2) = forecast_of(runners(2), t_end, .false.)
@@ -241,7 +243,7 @@ contains
       !> has to show its whole run.
       logical function is_spent()
          real(wp) :: budget, share
-         budget = min(most_effort(motion%dynamics%scene), even_share*minval(forecast(:n_even)))
+         budget = min(most_effort(motion%dynamics), even_share*minval(forecast(:n_even)))
          share = own_share
          if (candidates(best)%order == 2 .and. runners(best)%growth > 1.4_wp) share = growing_share
          if (forecast(best) < minval(forecast(:n_even)) .and. .not. order_is_risky(best)) budget = min(budget, share*forecast(best))
@@ -266,8 +268,8 @@ contains
             a_step = explicit_step
             start = 0.0_wp
             if (candidates(j)%method == 'gauss') then
-               a_step = effort_of_step(motion%dynamics%scene) + 2.0_wp*effort_of_nodes(motion%dynamics%scene)
-               start = effort_of_modes(motion%dynamics%scene, 2)
+               a_step = effort_of_step(motion%dynamics) + 2.0_wp*effort_of_nodes(motion%dynamics)
+               start = effort_of_modes(motion%dynamics, 2)
             end if
             if (start > 2.0_wp*even_trial*expected(j)) cycle
             most = min(even_steps*a_step, even_trial*expected(j))
@@ -340,9 +342,9 @@ contains
    end function dying_out
 
    !> However long the run: what a candidate may spend in about a second, since a trial says nothing and cannot be stopped.
-   pure real(wp) function most_effort(scene)
-      type(scene_type), intent(in) :: scene
-      most_effort = 2.5e6_wp/(1.0_wp + 0.37_wp*scene%n) ! the last round may double it
+   pure real(wp) function most_effort(dynamics)
+      type(dynamics_type), intent(in) :: dynamics
+      most_effort = 2.5e6_wp/(1.0_wp + 0.37_wp*dynamics%scene%n) ! the last round may double it
    end function most_effort
 
    !> Effort to the end if the pace stays, or goes on growing as it did.
@@ -446,7 +448,7 @@ contains
 
       if (.not. associated(self%motion)) then
          call start_runner(self, candidate, motion, y, options, t_end, listener)
-         if (.not. self%failed) self%begun = effort_of(candidate%method, motion%dynamics%scene, self%integrator%statistics())
+         if (.not. self%failed) self%begun = effort_of(candidate%method, motion%dynamics, self%integrator%statistics())
          self%effort = self%begun
       end if
       effort_before = self%effort
@@ -458,7 +460,7 @@ contains
          self%integrator%options%max_steps = int(min(stats%n_steps + steps, int(huge(steps), i8)))
          call self%integrator%advance(t_end, state, self%reached, error)
          stats = self%integrator%statistics()
-         self%effort = effort_of(candidate%method, motion%dynamics%scene, stats)
+         self%effort = effort_of(candidate%method, motion%dynamics, stats)
          if (.not. allocated(error) .and. self%integrator%at_event) call pass_event(self, state, error)
          self%failed = allocated(error) .and. self%reached < t_end .and. stats%n_steps < self%integrator%options%max_steps
       end do

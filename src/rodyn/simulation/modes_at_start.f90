@@ -1,11 +1,10 @@
 !> Modes of a case about the state in which it begins.
 module rodyn_modes_at_start
    use rodyn_kinds, only: wp
-   use rodyn_case_config, only: case_config, load_config
+   use rodyn_case_config, only: case_config
    use rodyn_equilibrium, only: find_equilibrium
    use rodyn_errors, only: error_type
    use rodyn_linear_model, only: linear_model, new_linear_model
-   use rodyn_loads, only: new_load_set
    use rodyn_modes, only: mode_set, new_modes
    use rodyn_motion, only: motion_type, initial_state
    implicit none (type, external)
@@ -24,8 +23,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: y(:)
 
-      if (.not. (loads .or. equilibrium)) call new_load_set(motion%dynamics%scene%loads, [load_config ::])
-      call motion%dynamics%set_regime(0.0_wp, minval([motion%dynamics%scene%switches, config%t_end]))
+      call motion%dynamics%set_regime(0.0_wp, minval([motion%switches, config%t_end]), loaded=loads .or. equilibrium)
       call initial_state(motion, config%initial, y)
       if (motion%events%watches) then
          associate (r => motion%n_q, m => motion%n_dof)

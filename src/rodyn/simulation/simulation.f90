@@ -102,7 +102,7 @@ contains
       t = 0.0_wp
       call check_times(times, t_end, error)
       if (allocated(error)) return
-      ends = interval_ends(motion%dynamics%scene%switches, t_end)
+      ends = interval_ends(motion%switches, t_end)
       next = 1
       do segment = 1, size(ends)
          call motion%begin_regime(t, ends(segment), t_end, y, error)

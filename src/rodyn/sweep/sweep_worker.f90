@@ -258,7 +258,7 @@ contains
       method = method_named(case%choice%method)
       goes_in_lane = .false.
       if (method%in_lanes .and. suits_lane_dop853(case%choice%options)) &
-         goes_in_lane = suits_lanes(case%motion%dynamics%scene)
+         goes_in_lane = suits_lanes(case%motion%dynamics%scene, case%motion%dynamics%hinges)
    end function goes_in_lane
 
    subroutine observe(self, member, t, y, error)
