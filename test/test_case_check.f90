@@ -579,7 +579,8 @@ contains
       config%loads(2)%node = 3
       config%loads(1)%law = 'step'
       call new_scene(scene, config, refusal)
-      call check(error, refusal%message, "&load law = 'step': must be 'constant', 'table', 'sine_squared' or 'smooth_step'"//nl// &
+      call check(error, refusal%message, "&load law = 'step': must be 'constant', 'table', 'sine_squared', 'smooth_step', "// &
+                 "'ramp' or 'sine'"//nl// &
                  "&load(2) node = 3: goes with target = 'node' only", 'message')
    end subroutine test_instances
 

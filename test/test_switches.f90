@@ -7,6 +7,8 @@ module test_switches
    use rodyn_loads, only: load_regime, new_load_regime
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_switch_times, only: add_switches, interval_ends, same_time
+   use rodyn_text, only: word, word_count
+   use rodyn_time_law, only: law_config, law_words, new_time_law, time_law
    use rodyn_user_load, only: user_load
    use test_testing, only: unittest, new_test, check, check_close
    use test_trajectories, only: trajectory, integrate
@@ -39,7 +41,8 @@ contains
                new_test('what lasts no longer than rounding does not act, a jump does', test_short), &
                new_test('a hinge is released at a switch one rounding before its time', test_release), &
                new_test('three thousand overlapping loads are compiled and entered quickly', test_thousands), &
-               new_test('a table ends at its last time unless it is held', test_after)]
+               new_test('a table ends at its last time unless it is held', test_after), &
+               new_test('every law of forces and of motions has the derivatives of its value', test_derivatives)]
    end subroutine collect_switches
 
    subroutine compile(scene, loads, error)
@@ -318,5 +321,30 @@ contains
       end subroutine momenta
 
    end subroutine test_after
+
+   !> Against central differences of the value alone, in the middle of a piece.
+   subroutine test_derivatives(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(law_config) :: given
+      type(time_law) :: law, piece
+      real(wp), parameter :: t = 0.7_wp, h = 1.0e-4_wp, tolerance = 200.0_wp*h**2 ! fourth derivatives are below 1300
+      real(wp) :: before, now, after
+      integer :: i, serves
+
+      given = law_config(t_start=0.2_wp, t_end=1.9_wp, value=2.0_wp, rate=3.0_wp, rise_time=1.1_wp, &
+                         times=[0.1_wp, 0.5_wp, 1.2_wp, 2.0_wp], values=[0.0_wp, 1.0_wp, 0.5_wp, 2.0_wp])
+      do i = 1, word_count(law_words)
+         do serves = 1, 2
+            call new_time_law(law, word(law_words, i), given, of_motion=serves == 2, hold=.false.)
+            call law%take_piece(t, piece)
+            before = piece%value_at(t - h)
+            now = piece%value_at(t)
+            after = piece%value_at(t + h)
+            call check_close(error, piece%motion_at(t), [now, (after - before)/(2.0_wp*h), (after - 2.0_wp*now + before)/h**2], &
+                             tolerance, word(law_words, i))
+            if (allocated(error)) return
+         end do
+      end do
+   end subroutine test_derivatives
 
 end module test_switches

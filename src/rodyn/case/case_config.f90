@@ -15,7 +15,7 @@ module rodyn_case_config
       any_list, positive, not_negative, at_least, in_range, between, up_to
    use rodyn_schema_collector, only: schema_collector
    use rodyn_text, only: has_word
-   use rodyn_time_law, only: keys_of_law, law_config
+   use rodyn_time_law, only: keys_of_law, law_config, law_words, motion_words
    implicit none (type, external)
    private
    public :: case_config, spacecraft_config, chain_config, profile_config, model_config, initial_config, load_config, kink_config, &
@@ -24,6 +24,8 @@ module rodyn_case_config
 
    integer, parameter :: rods = 1, nodes = 2, hinges = 3 !! what arrays run over, see `case_extents`
    integer, parameter :: most_rods = 1000000
+   character(len=*), parameter :: rate_when = "required when law = 'sine' or 'sine_squared'"
+   character(len=*), parameter :: rate_help = 'sine: value * sin(rate * (t - t_start)); sine_squared: value * sin(rate * t)**2'
    real(wp), parameter :: none_given = huge(1.0_wp) !! an angle or time that the case does not have
 
    !> &spacecraft
@@ -93,14 +95,14 @@ module rodyn_case_config
       character(len=name_length) :: target = 'spacecraft' !! 'spacecraft' or 'node'
       integer :: node = 0                                 !! 1..n when target is 'node'
       character(len=name_length) :: component = 'M'       !! 'X', 'Y' [N] or 'M' [N m], moving axes
-      character(len=name_length) :: law = 'constant'      !! 'constant', 'table', 'sine_squared', 'smooth_step'
+      character(len=name_length) :: law = 'constant'      !! of `law_words`
       character(len=name_length) :: after = 'zero'        !! of table, beyond its last time: 'zero' or 'hold'
    end type load_config
 
    !> One &kink_program group; values in [rad]. A step has t_end = t_start
    type, extends(law_config) :: kink_config
       integer :: hinge = 0                              !! 0..n-1
-      character(len=name_length) :: law = 'smooth_step' !! 'ramp', 'smooth_step', 'sine' or 'table'
+      character(len=name_length) :: law = 'smooth_step' !! of `motion_words`
    end type kink_config
 
    !> One &hinge group. All angles are joint rotations th, from the kink.
@@ -340,7 +342,7 @@ contains
             when="required when target = 'node'", help='node 1..n on which the load acts'))
       call visitor%word_field(load%component, key('component', words='X|Y|M', &
          help='force along a moving axis [N], or moment [N m] (spacecraft only)'))
-      call visitor%word_field(load%law, key('law', words='constant|table|sine_squared|smooth_step', &
+      call visitor%word_field(load%law, key('law', words=law_words, &
          help='how the load changes between t_start and t_end; outside it is zero'))
       keys = keys_of_law(load%law) ! a reader has just read it
       call visitor%field(load%t_start, key('t_start', 's', help='the load begins'))
@@ -349,8 +351,8 @@ contains
          call visitor%field(load%value, key('value', 'N or N m', default='depends', example='1500.0', &
             when="required unless law = 'table'", help='constant value, amplitude, or height of the step'))
       if (visitor%every_key .or. has_word(keys, 'rate')) &
-         call visitor%field(load%rate, key('rate', 'rad/s', default='depends', when="required when law = 'sine_squared'", &
-            help='value * sin(rate * t)**2'))
+         call visitor%field(load%rate, key('rate', 'rad/s', default='depends', when=rate_when, &
+            help=rate_help))
       if (visitor%every_key .or. has_word(keys, 'rise_time')) &
          call visitor%field(load%rise_time, key('rise_time', 's', rule=positive, default='depends', &
             when="law = 'smooth_step'; default: t_end - t_start", help='duration of the rise from 0 to value'))
@@ -377,7 +379,7 @@ contains
          help='a kink that moves; repeat the group for each program, or leave it out'), instance)
       call visitor%field(program%hinge, key('hinge', rule=not_negative, default='required', example='0', &
          help='hinge 0..n-1 whose kink moves'))
-      call visitor%word_field(program%law, key('law', words='ramp|smooth_step|sine|table', &
+      call visitor%word_field(program%law, key('law', words=motion_words, &
          help='how it moves between t_start and t_end; after, it stays; smooth_step: continuous acceleration'))
       keys = keys_of_law(program%law)
       if (visitor%every_key .or. has_word(keys, 't_start')) &
@@ -389,8 +391,7 @@ contains
          call visitor%field(program%value, key('value', 'rad', default='depends', example='0.1', &
             when="required unless law = 'table'", help='change of the kink, or amplitude of the sine'))
       if (visitor%every_key .or. has_word(keys, 'rate')) &
-         call visitor%field(program%rate, key('rate', 'rad/s', default='depends', when="required when law = 'sine'", &
-            help='value * sin(rate * (t - t_start))'))
+         call visitor%field(program%rate, key('rate', 'rad/s', default='depends', when=rate_when, help=rate_help))
       if (visitor%every_key .or. has_word(keys, 'times')) &
          call visitor%field(program%times, key('times', 's', any_list, default='depends', when="required when law = 'table'", &
             help='increasing times, two at least'))

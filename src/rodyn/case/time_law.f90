@@ -10,7 +10,7 @@ module rodyn_time_law
    use rodyn_switch_times, only: last_before, same_time
    implicit none (type, external)
    private
-   public :: law_config, time_law, new_time_law, law_times, keys_of_law, moves_smoothly
+   public :: law_config, time_law, new_time_law, law_times, law_words, motion_words, keys_of_law, moves_smoothly
 
    !> What a namelist group gives of its law, but for its name, whose default is the group's own.
    type :: law_config
@@ -37,6 +37,11 @@ module rodyn_time_law
       law_row('smooth_step', 't_start|t_end|value|rise_time', .true.), &
       law_row('ramp', 't_start|t_end|value', .false.), &
       law_row('sine', 't_start|t_end|value|rate', .false.)]
+
+   !> Their words as a list; a motion is not constant.
+   character(len=*), parameter :: motion_words = trim(laws(2)%word)//'|'//trim(laws(3)%word)//'|'//trim(laws(4)%word)//'|'// &
+      trim(laws(5)%word)//'|'//trim(laws(6)%word)
+   character(len=*), parameter :: law_words = trim(laws(1)%word)//'|'//motion_words
 
    !> The same as numbers, so that the right-hand side compares no text; the last is the table of a motion.
    integer, parameter :: law_constant = 1, law_table = 2, law_sine_squared = 3, law_smooth_step = 4, law_ramp = 5, law_sine = 6, &
