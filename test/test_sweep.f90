@@ -7,6 +7,7 @@ module test_sweep
    use rodyn_sweep_case, only: allocate_result, build_case, case_result, case_shape, new_case_shape, status_done
    use rodyn_sweep_config, only: sweep_config
    use rodyn_sweep_plan, only: new_plan, sweep_plan
+   use rodyn_input_texts, only: input_texts, new_input_texts
    use rodyn_sweep_reader, only: parse_sweep
    use rodyn_sweep_record, only: decode_record, encode_record, is_sound, record_words
    use rodyn_sweep_shard, only: header_words, shard_extent, shard_header, shard_trailer, sift_shard
@@ -47,7 +48,9 @@ contains
       type(sweep_config), intent(out) :: sweep
       type(sweep_plan), intent(out) :: plan
       type(error_type), allocatable, intent(out) :: error
-      call parse_sweep(text, 's.nml', base, 'b.nml', .true., sweep, error)
+      type(input_texts) :: input
+      call new_input_texts(input, text, 's.nml', base, 'b.nml')
+      call parse_sweep(input, .true., sweep, error)
       if (.not. allocated(error)) call new_plan(plan, sweep, error)
    end subroutine new_sweep
 

@@ -2,6 +2,7 @@
 module rodyn_bench_campaign_runs
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type, exit_stopped
+   use rodyn_case_check, only: sound_case
    use rodyn_case_config, only: case_config
    use rodyn_motion, only: motion_type, state_invariants
    use rodyn_run_setup, only: run_setup, new_run_setup
@@ -89,11 +90,12 @@ contains
    end subroutine observe
 
    !> Integrate a case, with looks at the given times, for at most `budget` seconds of processor time beside the choice of a method.
-   subroutine run_campaign_case(config, times, budget, result)
-      type(case_config), intent(in) :: config
+   subroutine run_campaign_case(given, times, budget, result)
+      type(case_config), intent(in) :: given
       real(wp), intent(in) :: times(:) !! increasing from 0; the last is the end [s]
       real(wp), intent(in) :: budget   !! [s]
       type(run_result), intent(out) :: result
+      type(case_config) :: config !! with what is not given
       type(run_setup), target :: setup
       type(driver_type) :: driver
       type(invariant_recorder) :: recorder
@@ -104,7 +106,8 @@ contains
       call cpu_time(start)
       result%status = 'refused'
       result%message = ''
-      call new_run_setup(setup, config, .true., error)
+      call sound_case(given, config, error)
+      if (.not. allocated(error)) call new_run_setup(setup, config, .true., error)
       if (.not. allocated(error)) call new_driver(driver, setup%motion, setup%y, config%solver, times(size(times)), size(times), &
                                                   error)
       if (.not. allocated(error)) call driver%make(error)

@@ -2,7 +2,7 @@
 module rodyn_command_line
    use rodyn_errors, only: error_type, raise, exit_done, exit_bad_input
    use rodyn_case_config, only: case_config
-   use rodyn_case_reader, only: default_case, parse_case
+   use rodyn_case_reader, only: case_from_document, default_case
    use rodyn_case_notes, only: case_notes, degrees_note, joined_lines
    use rodyn_input_texts, only: input_texts, is_result_file, is_stream, read_input_texts
    use rodyn_launcher, only: direct_launch, launch_type
@@ -11,7 +11,7 @@ module rodyn_command_line
    use rodyn_run, only: check_steps, run_case
    use rodyn_posix, only: ignore_signal, same_path, sigpipe, write_output
    use rodyn_resources, only: ensure_stack
-   use rodyn_scene, only: scene_type, new_scene
+   use rodyn_scene, only: scene_type, compile_scene
    use rodyn_sweep_config, only: sweep_config
    use rodyn_sweep_engine, only: run_sweep, sweep_options
    use rodyn_sweep_plan, only: new_plan, sweep_plan
@@ -142,7 +142,7 @@ contains
       if (input%is_sweep) then
          call raise(error, file//': is a sweep; '//instead, exit_bad_input)
       else
-         call parse_case(input%text, input%name, config, error)
+         call case_from_document(input%document, config, error)
       end if
    end subroutine read_one_case
 
@@ -198,12 +198,12 @@ contains
       name = input%name
       if (input%from_result) name = options%file
       if (input%is_sweep) then
-         call parse_sweep(input%text, input%name, input%base_text, input%base_name, .true., sweep, error, input%base_failure)
+         call parse_sweep(input, .true., sweep, error)
          if (.not. allocated(error)) call new_plan(plan, sweep, error)
-         if (.not. allocated(error)) call new_scene(scene, sweep%base_case, error)
+         if (.not. allocated(error)) call compile_scene(scene, sweep%base_case, error)
       else ! numbers may be finite, and what follows from them not
-         call parse_case(input%text, input%name, config, error)
-         if (.not. allocated(error)) call new_scene(scene, config, error)
+         call case_from_document(input%document, config, error)
+         if (.not. allocated(error)) call compile_scene(scene, config, error)
          if (.not. allocated(error)) call check_steps(config, input%name, error)
       end if
       if (allocated(error) .or. options%quiet) return

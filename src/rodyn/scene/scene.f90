@@ -23,7 +23,7 @@ module rodyn_scene
    use rodyn_switch_times, only: add_switches, same_time, united_time
    implicit none (type, external)
    private
-   public :: scene_type, new_scene
+   public :: scene_type, new_scene, compile_scene
 
    !> A compiled case.
    type :: scene_type
@@ -110,10 +110,18 @@ contains
       type(case_config), intent(in) :: given
       type(error_type), allocatable, intent(out) :: error
       type(case_config) :: config !! with what is not given
-      integer :: k
 
       call sound_case(given, config, error)
-      if (allocated(error)) return
+      if (.not. allocated(error)) call compile_scene(scene, config, error)
+   end subroutine new_scene
+
+   !> The same of a case that is complete and was found sound, by `sound_case` or as it was read.
+   subroutine compile_scene(scene, config, error)
+      type(scene_type), intent(out) :: scene
+      type(case_config), intent(in) :: config
+      type(error_type), allocatable, intent(out) :: error
+      integer :: k
+
       scene%n = config%chain%n_rods
       scene%n_base = merge(0, 3, config%spacecraft%motion == 'fixed')
       scene%dynamic_bending = config%model%bending == 'dynamic'
@@ -136,7 +144,7 @@ contains
       scene%n_q = scene%n_dof + size(scene%hinges%relaxing)
       call new_load_set(scene%loads, config%loads)
       call collect_switches(scene, config%t_end)
-   end subroutine new_scene
+   end subroutine compile_scene
 
    !> Switches of loads, kinks and releases. What is released at a switch is released then, to the last digit.
    subroutine collect_switches(scene, t_end)

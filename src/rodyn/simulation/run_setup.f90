@@ -5,7 +5,7 @@ module rodyn_run_setup
    use rodyn_case_config, only: case_config
    use rodyn_errors, only: error_type
    use rodyn_motion, only: motion_type, new_motion, initial_state
-   use rodyn_scene, only: scene_type, new_scene
+   use rodyn_scene, only: scene_type, compile_scene
    use rodyn_user_load, only: user_load
    implicit none (type, external)
    private
@@ -22,13 +22,13 @@ contains
    !> Compile a case and put it at its initial state.
    subroutine new_run_setup(setup, config, ledger, error, load)
       type(run_setup), intent(out) :: setup
-      type(case_config), intent(in) :: config
+      type(case_config), intent(in) :: config !! complete and sound: read from a file, or by `sound_case`
       logical, intent(in) :: ledger !! the state ends with work and dissipated energy
       type(error_type), allocatable, intent(out) :: error
       class(user_load), target, intent(inout), optional :: load !! forces of the caller's; must outlive the set-up
       type(scene_type) :: scene
 
-      call new_scene(scene, config, error)
+      call compile_scene(scene, config, error)
       if (.not. allocated(error)) call new_motion(setup%motion, scene, ledger, error)
       if (allocated(error)) return
       if (present(load)) call setup%motion%set_user_load(load)

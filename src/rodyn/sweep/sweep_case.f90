@@ -6,7 +6,7 @@ module rodyn_sweep_case
    use rodyn_kinds, only: wp, i8
    use rodyn_case_config, only: case_config
    use rodyn_case_reader, only: case_from_document
-   use rodyn_errors, only: error_type, raise, exit_stopped
+   use rodyn_errors, only: error_type, raise, exit_bad_input, exit_stopped
    use rodyn_driver, only: driver_type, new_driver
    use rodyn_integrator, only: monitor_type, solver_statistics
    use rodyn_linear_model, only: linear_model
@@ -164,8 +164,11 @@ contains
       end if
       do a = 1, size(sweep%axes)
          associate (axis => sweep%axes(a), chain => config%chain)
-            if (is_ratio(axis) .and. row_of(axis, rows) > 0) chain%node_mass(:) = axis%numbers(rows(axis%dimension))* &
+            if (.not. is_ratio(axis) .or. row_of(axis, rows) == 0) cycle
+            chain%node_mass(:) = axis%numbers(rows(axis%dimension))* &
                sum(chain%length*chain%mass_per_length*mean_mass_factors(chain%n_rods, config%profiles))/chain%n_rods
+            if (.not. chain%node_mass(1) <= huge(1.0_wp)) call raise(error, '&chain node_mass = Infinity: must be finite', &
+                                                                    exit_bad_input)
          end associate
       end do
    end subroutine build_values

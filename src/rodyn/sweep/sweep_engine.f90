@@ -5,7 +5,7 @@
 module rodyn_sweep_engine
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type, raise, exit_bad_input, exit_done, exit_failed, exit_stopped
-   use rodyn_input_texts, only: input_texts, read_input_texts
+   use rodyn_input_texts, only: input_texts, new_input_texts, read_input_texts
    use rodyn_lanes, only: lanes
    use rodyn_lapack, only: use_one_thread
    use rodyn_posix, only: ignore_signal, path_exists, sigxfsz
@@ -171,7 +171,7 @@ contains
          call read_input_texts(engine%options%file, input, error)
          if (.not. allocated(error) .and. .not. input%is_sweep) call raise(error, input%name// &
             ': has neither &sweep nor &axis, so it is no sweep; rodyn run computes a case', exit_bad_input)
-         if (.not. allocated(error)) call parse(.true.)
+         if (.not. allocated(error)) call parse_sweep(input, .true., engine%sweep, error)
          if (engine%ranks%launched > 1 .and. engine%ranks%count == 1 .and. .not. allocated(error)) &
             call raise(error, to_text(engine%ranks%launched)//' processes were started, but MPI connects none of them; '// &
                        'try srun --mpi=pmix, or --shard', exit_bad_input)
@@ -180,25 +180,21 @@ contains
       end if
       call share_fault(engine, error)
       if (allocated(error)) return
-      call engine%ranks%share_text(input%text)
-      call engine%ranks%share_text(input%name)
-      call engine%ranks%share_text(input%base_text)
-      call engine%ranks%share_text(input%base_name)
-      if (engine%ranks%rank > 0) call parse(.false.)
+      call engine%ranks%share_text(engine%sweep%text)
+      call engine%ranks%share_text(engine%sweep%name)
+      call engine%ranks%share_text(engine%sweep%base_text)
+      call engine%ranks%share_text(engine%sweep%base_name)
+      if (engine%ranks%rank > 0) then
+         associate (sweep => engine%sweep)
+            call new_input_texts(input, sweep%text, sweep%name, sweep%base_text, sweep%base_name)
+         end associate
+         call parse_sweep(input, .false., engine%sweep, error)
+      end if
       if (.not. allocated(error)) call new_plan(engine%plan, engine%sweep, error)
       if (allocated(error)) return
       call new_case_shape(engine%shape, engine%sweep)
       call check_memory('n_rods = '//to_text(engine%shape%layout%n_rods)//', '//to_text(engine%plan%n_cases)//' cases, '// &
                         to_text(engine%shape%n_rows)//' rows of series', memory_of_sweep(engine), error)
-
-   contains
-
-      subroutine parse(try_values)
-         logical, intent(in) :: try_values
-         call parse_sweep(input%text, input%name, input%base_text, input%base_name, try_values, engine%sweep, error, &
-                          input%base_failure)
-      end subroutine parse
-
    end subroutine read_input
 
    !> Memory of one process: cases that are under way with their results, and what is known of all [bytes].

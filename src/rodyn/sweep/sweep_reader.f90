@@ -1,7 +1,7 @@
 !> From a sweep file to a `sweep_config`: strict, and with every fault of the file in one error.
 !>
 !>     call read_input_texts('cases/table3_sweep.nml', input, error)
-!>     call parse_sweep(input%text, input%name, input%base_text, input%base_name, .true., sweep, error)
+!>     call parse_sweep(input, .true., sweep, error)
 !>     call new_plan(plan, sweep, error)
 module rodyn_sweep_reader
    use rodyn_kinds, only: i8, wp
@@ -12,6 +12,8 @@ module rodyn_sweep_reader
    use rodyn_document_checks, only: check_document
    use rodyn_errors, only: error_type
    use rodyn_field_loader, only: field_loader
+   use rodyn_file_text, only: read_text_file
+   use rodyn_input_texts, only: input_texts
    use rodyn_namelist_document, only: namelist_document, group_count
    use rodyn_namelist_edit, only: split_key
    use rodyn_namelist_parser, only: parse_document
@@ -19,11 +21,11 @@ module rodyn_sweep_reader
       row_index, rule_text, satisfies, type_integer, type_logical, type_real, type_word
    use rodyn_sweep_case, only: build_values
    use rodyn_sweep_config, only: sweep_axis, sweep_config, axis_size, is_ratio, shown_value
-   use rodyn_sweep_keys, only: axis_keys, sweep_keys, sweep_extents, sweep_schema, visit_axis, visit_blank_sweep, visit_sweep
+   use rodyn_sweep_keys, only: axis_keys, sweep_extents, sweep_schema, visit_axis, visit_blank_sweep, visit_sweep
    use rodyn_text, only: formatted, lower, printable, tidy, to_text
    implicit none (type, external)
    private
-   public :: parse_sweep, find_base, is_sweep_text, default_sweep
+   public :: parse_sweep, default_sweep
 
    character(len=*), parameter :: nl = new_line('a')
    integer, parameter :: most_tried = 10000 !! rows of a dimension that are built
@@ -36,85 +38,63 @@ module rodyn_sweep_reader
 
 contains
 
-   !> Where the base of a sweep is: its path, from the directory of the sweep file; empty if the sweep names none.
-   subroutine find_base(text, directory, path)
-      character(len=*), intent(in) :: text
-      character(len=*), intent(in) :: directory
-      character(len=:), allocatable, intent(out) :: path
-      type(namelist_document), target :: document
-      type(checked_document), target :: checked
-      type(field_loader) :: loader
-      type(sweep_keys) :: given
-
-      call parse_document(text, '', document)
-      call check_sweep_document(document, checked)
-      loader%checked => checked
-      call visit_sweep(loader, given)
-      path = given%base
-      if (len_trim(path) == 0 .or. entry_of(checked, 'sweep', 1, 'base') == 0) then
-         path = ''
-      else if (index(path, '/') /= 1 .and. directory /= '.') then
-         path = directory//'/'//path
-      end if
-   end subroutine find_base
-
-   !> Hold a document against the keys of a sweep.
-   subroutine check_sweep_document(document, checked)
-      type(namelist_document), intent(in), target :: document
-      type(checked_document), intent(out) :: checked
-      type(schema_group), allocatable :: groups(:)
-      type(schema_row), allocatable :: rows(:)
-
-      call sweep_schema(groups, rows)
-      call match_document(document, groups, rows, checked)
-      call check_document(checked, sweep_extents)
-   end subroutine check_sweep_document
-
    !> Check and complete a sweep and its base.
-   subroutine parse_sweep(text, name, base_text, base_name, try_values, sweep, error, base_failure)
-      character(len=*), intent(in) :: text, name
-      character(len=*), intent(in) :: base_text, base_name !! empty name: there is none
+   subroutine parse_sweep(input, try_values, sweep, error)
+      type(input_texts), intent(in), target :: input
       logical, intent(in) :: try_values !! build a case with each value of each axis
       type(sweep_config), intent(out) :: sweep
       type(error_type), allocatable, intent(out) :: error !! exit code 2, all faults
-      character(len=*), intent(in), optional :: base_failure !! why the base could not be read; empty: it could
-      type(namelist_document), target :: document
       type(checked_document), target :: checked
+      type(schema_group), allocatable :: groups(:)
+      type(schema_row), allocatable :: rows(:)
+      type(field_loader) :: loader
       type(error_type), allocatable :: base_error
       logical :: has_base
 
-      sweep%name = name
-      sweep%text = text
-      sweep%base_name = base_name
-      sweep%base_text = base_text
+      sweep%name = input%name
+      sweep%text = input%text
       sweep%tried = ''
-      has_base = len(base_name) > 0
-      if (present(base_failure)) has_base = has_base .and. len(base_failure) == 0
+      call sweep_schema(groups, rows)
+      call match_document(input%document, groups, rows, checked)
+      call check_document(checked, sweep_extents)
+      loader%checked => checked
+      call visit_sweep(loader, sweep)
+      call read_base(checked, input, sweep, has_base)
       if (has_base) then
-         call parse_document(base_text, base_name, sweep%base_document)
+         call parse_document(sweep%base_text, sweep%base_name, sweep%base_document)
          call case_from_document(sweep%base_document, sweep%base_case, base_error)
-      end if
-      call parse_document(text, name, document)
-      call check_sweep_document(document, checked)
-      if (present(base_failure)) then
-         if (len(base_failure) > 0) call blame(checked, 'sweep', 1, 'base', base_failure)
       end if
       call load_sweep(checked, sweep, has_base, has_base .and. .not. allocated(base_error))
       if (try_values .and. has_base .and. .not. allocated(base_error) .and. sweep%n_dimensions <= most_dimensions) &
          call try_axes(checked, sweep)
-      call checked%faults%to_error(name, error)
+      call checked%faults%to_error(input%name, error)
       if (.not. allocated(base_error)) return
       if (allocated(error)) base_error%message = error%message//nl//base_error%message
       call move_alloc(base_error, error)
    end subroutine parse_sweep
 
-   !> Is the text a sweep file: has it a &sweep or &axis group?
-   logical function is_sweep_text(text)
-      character(len=*), intent(in) :: text
-      type(namelist_document) :: document
-      call parse_document(text, '', document)
-      is_sweep_text = group_count(document, 'sweep') > 0 .or. group_count(document, 'axis') > 0
-   end function is_sweep_text
+   !> The text of the base: it came with the sweep, or is a file that the sweep names.
+   subroutine read_base(checked, input, sweep, found)
+      type(checked_document), intent(inout) :: checked
+      type(input_texts), intent(in) :: input
+      type(sweep_config), intent(inout) :: sweep
+      logical, intent(out) :: found
+      type(error_type), allocatable :: failure
+
+      sweep%base_text = ''
+      sweep%base_name = ''
+      found = allocated(input%base_name)
+      if (found) then
+         sweep%base_text = input%base_text
+         sweep%base_name = input%base_name
+      else if (len_trim(sweep%base) > 0 .and. entry_of(checked, 'sweep', 1, 'base') > 0) then
+         sweep%base_name = sweep%base
+         if (index(sweep%base, '/') /= 1 .and. input%directory /= '.') sweep%base_name = input%directory//'/'//sweep%base
+         call read_text_file(sweep%base_name, sweep%base_text, failure)
+         found = .not. allocated(failure)
+         if (.not. found) call blame(checked, 'sweep', 1, 'base', failure%message)
+      end if
+   end subroutine read_base
 
    !> A complete commented sweep file.
    function default_sweep() result(text)
@@ -129,7 +109,7 @@ contains
    !> Fill the configuration, and note what is wrong with several keys together.
    subroutine load_sweep(checked, sweep, has_base, base_is_sound)
       type(checked_document), intent(inout), target :: checked
-      type(sweep_config), intent(inout) :: sweep
+      type(sweep_config), intent(inout) :: sweep !! has the keys of &sweep
       logical, intent(in) :: has_base, base_is_sound
       type(field_loader) :: loader
       type(axis_keys), allocatable :: given(:)
@@ -137,7 +117,6 @@ contains
       integer :: i, n_axes, n_faults
 
       loader%checked => checked
-      call visit_sweep(loader, sweep)
       if (base_is_sound .and. .not. is_given(checked, 'sweep', 1, 'probe_times')) &
          sweep%probe_times = [sweep%base_case%t_end]
       do i = 2, size(sweep%probe_times)
