@@ -102,7 +102,7 @@ PARAMETERS = {
     "model.inertia": ("inertia", ""), "model.formulation": ("formulation", ""), "model.bending": ("bending", ""),
     "solver.rtol": ("relative tolerance", ""), "solver.atol": ("absolute tolerance", ""),
     "solver.fixed_step": (r"step $\Delta t$", "s"), "solver.max_step": ("longest step", "s"), "solver.method": ("method", ""),
-    "n_rhs": ("right-hand sides", ""), "wall_seconds": ("wall time", "s"), "t_reached": ("time reached", "s"),
+    "n_rhs": ("right-hand-side evaluations", ""), "wall_seconds": ("wall time", "s"), "t_reached": ("time reached", "s"),
 }
 VERSION_ATTRIBUTES = [
     "program_version", "git_commit", "compiler", "compiler_options", "sundials_version", "hdf5_version", "hostname", "created",

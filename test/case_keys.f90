@@ -63,29 +63,29 @@ contains
       type(error_type), allocatable, intent(out) :: error
       call expect_faults(error, &
          valid//'&case /'//nl//'&CASE /', &
-         'c.nml:4: &case: the group may stand only once, and begins in line 3 already')
+         'c.nml:4: &case: the group must not be repeated; the first one is in line 3')
    end subroutine second_group
 
    subroutine key_twice(error)
       type(error_type), allocatable, intent(out) :: error
       call expect_faults(error, &
          valid//'&solver rtol = 1e-3'//nl//' RTOL = 1e-4 /', &
-         'c.nml:4: &solver rtol = 1e-4: the key stands in line 3 already')
+         'c.nml:4: &solver rtol = 1e-4: duplicate key, first given in line 3')
    end subroutine key_twice
 
    subroutine element_twice(error)
       type(error_type), allocatable, intent(out) :: error
       call expect_faults(error, &
          valid//'&initial phi(2) = 1'//nl//' phi(1:3) = 2 /', &
-         'c.nml:4: &initial phi(1:3) = 2: element 2 is given in line 3 already')
+         'c.nml:4: &initial phi(1:3) = 2: element 2 is given twice, first in line 3')
    end subroutine element_twice
 
    subroutine element_outside(error)
       type(error_type), allocatable, intent(out) :: error
       call expect_faults(error, &
          valid//'&initial phi(0) = 1, phi(2:5) = 2 /', &
-         'c.nml:3: &initial phi(0) = 1: there is no such rod; they are numbered 1..4'//nl//&
-         'c.nml:3: &initial phi(2:5) = 2: there is no such rod; they are numbered 1..4')
+         'c.nml:3: &initial phi(0) = 1: there is no such rod; the numbers are 1..4'//nl//&
+         'c.nml:3: &initial phi(2:5) = 2: there is no such rod; the numbers are 1..4')
    end subroutine element_outside
 
    subroutine hinge_outside(error)
@@ -93,7 +93,7 @@ contains
       call expect_faults(error, &
          spacecraft//'&chain n_rods = 4, mass_per_length = 1, bending_stiffness = 1, '//&
          'hinge_stiffness = 1, length = 1'//nl//' kink(0) = 1, kink(4) = 1 /', &
-         'c.nml:3: &chain kink(4) = 1: there is no such hinge; they are numbered 0..3')
+         'c.nml:3: &chain kink(4) = 1: there is no such hinge; the numbers are 0..3')
    end subroutine hinge_outside
 
    subroutine index_of_scalar(error)
@@ -145,12 +145,12 @@ contains
       call expect_faults(error, &
          valid//'&case title = 3, t_end = .true., n_outputs = 1.5 /'//nl//'&model gauss_points = 1e1 /'//nl// &
          '&output ledger = 1, compression = ''4'' /'//nl//'&solver method = adams /', &
-         'c.nml:3: &case title = 3: must be a text in quotes'//nl//&
+         'c.nml:3: &case title = 3: must be a quoted string'//nl//&
          'c.nml:3: &case t_end = .true.: must be a number [s]'//nl//&
-         'c.nml:3: &case n_outputs = 1.5: must be a whole number'//nl//&
-         'c.nml:4: &model gauss_points = 1e1: must be a whole number; write 10'//nl//&
+         'c.nml:3: &case n_outputs = 1.5: must be an integer'//nl//&
+         'c.nml:4: &model gauss_points = 1e1: must be an integer; write 10'//nl//&
          'c.nml:5: &output ledger = 1: must be .true. or .false.'//nl//&
-         'c.nml:5: &output compression = ''4'': must be a whole number; without quotes'//nl//&
+         'c.nml:5: &output compression = ''4'': must be an integer; without quotes'//nl//&
          'c.nml:6: &solver method = adams: must be ''auto'', ''adams'', ''bdf'', ''erk'', ''dop853'' or ''gauss'', in '//&
          'quotes')
    end subroutine wrong_types

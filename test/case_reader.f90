@@ -299,7 +299,7 @@ contains
       type(case_config) :: config
       call parse_document(valid//'&load value = 1 / &load value = 2 /', 'c.nml', document)
       call set_value(document, 'load.value', '3', refusal)
-      call check(error, refusal%message, 'load.value: the group stands 2 times; say which, as in load(1).value', &
+      call check(error, refusal%message, 'load.value: there are 2 such groups; specify one, as in load(1).value', &
          'refusal')
       if (allocated(error)) return
       call set_value(document, 'load(2).value', '3', error)
@@ -325,10 +325,10 @@ contains
       call check_close(error, config%loads(2)%values, [5.0_wp, 9.0_wp, 6.5_wp, -8.0_wp], 0.0_wp, 'values')
       if (allocated(error)) return
       call set_value(document, 'load(2).values(5)', '1', refusal, in_list=.true.)
-      call check(error, refusal%message, 'load(2).values(5): there is no such element; the list has 4, numbered from 1', 'refusal')
+      call check(error, refusal%message, 'load(2).values(5): there is no such element; the array has 4, numbered from 1', 'refusal')
       if (allocated(error)) return
       call set_value(document, 'load(1).values(1)', '1', refusal, in_list=.true.)
-      call check(error, refusal%message, 'load(1).values(1): the base gives no list whose element this could be', 'refusal')
+      call check(error, refusal%message, 'load(1).values(1): the base has no array with such an element', 'refusal')
    end subroutine set_in_list
 
    subroutine set_refused(error)

@@ -36,7 +36,7 @@ contains
          new_test('a rod and its outer node are not both without mass', massless_rod), &
          new_test('each method has its orders', orders), &
          new_test('programs of kinks keep their rules', kink_rules), &
-         new_test('laws of hinges keep their rules', hinge_rules), &
+         new_test('hinge laws keep their rules', hinge_rules), &
          new_test('a free spacecraft needs mass and inertia', free_needs_mass)]
    end subroutine collect_case_rules
 
@@ -47,11 +47,11 @@ contains
          "&kink_program hinge = 0, law = 'table', value = 1, times = 0, 0, values = 1 /"//nl// &
          '&kink_program hinge = 1, value = 1, t_start = 1, t_end = 1 /'//nl// &
          "&kink_program hinge = 2, law = 'ramp', value = 1 /"//nl//'&hinge hinge = 2, held = .true. /', &
-         'c.nml:3: &kink_program hinge = 4: there is no such hinge; they are numbered 0..3'//nl// &
+         'c.nml:3: &kink_program hinge = 4: there is no such hinge; the numbers are 0..3'//nl// &
          "c.nml:4: &kink_program rate: is required when law = 'sine'"//nl// &
-         "c.nml:5: &kink_program value = 1: does not go with law = 'table'"//nl// &
+         "c.nml:5: &kink_program value = 1: does not apply to law = 'table'"//nl// &
          'c.nml:5: &kink_program times = 0, 0: must increase, but value 2, 0.00000, follows 0.00000 [s]'//nl// &
-         'c.nml:5: &kink_program values = 1: must be as many as times: 2, not 1'//nl// &
+         'c.nml:5: &kink_program values = 1: must have as many values as times: 2, not 1'//nl// &
          "c.nml:6: &kink_program t_start = 1: must be before t_end; only law = 'ramp' may be a step"//nl// &
          "c.nml:7: &kink_program law = 'ramp': must be 'smooth_step' or 'table' at a hinge that is held or latches: "// &
          'its rate must not jump')
@@ -64,14 +64,14 @@ contains
          '&hinge hinge = 1, lower_stop = 0.1, upper_stop = -0.1 /'//nl// &
          '&hinge hinge = 2, friction_moment = 1 /'//nl// &
          '&hinge hinge = 3, lock_damping = 1, freeplay_stiffness = 1 /', &
-         'c.nml:3: &hinge release_time = 1: goes with held = .true. only'//nl// &
-         'c.nml:4: &hinge hinge = 0: this hinge has a group &hinge already'//nl// &
+         'c.nml:3: &hinge release_time = 1: applies only with held = .true.'//nl// &
+         'c.nml:4: &hinge hinge = 0: this hinge already has a group &hinge'//nl// &
          'c.nml:4: &hinge release_after = 3: that hinge must have a latch_angle of its own'//nl// &
          'c.nml:5: &hinge upper_stop = -0.1: must be greater than lower_stop'//nl// &
-         'c.nml:5: &hinge stop_stiffness: is required with a stop, and positive'//nl// &
+         'c.nml:5: &hinge stop_stiffness: is required with a stop and must be positive'//nl// &
          'c.nml:6: &hinge friction_velocity: is required when friction_moment > 0'//nl// &
-         'c.nml:7: &hinge freeplay_stiffness = 1: goes with freeplay only'//nl// &
-         'c.nml:7: &hinge lock_damping = 1: goes with lock_stiffness only')
+         'c.nml:7: &hinge freeplay_stiffness = 1: applies only with freeplay'//nl// &
+         'c.nml:7: &hinge lock_damping = 1: applies only with lock_stiffness')
    end subroutine hinge_rules
 
    subroutine dynamic_lumped(error)
@@ -155,7 +155,7 @@ contains
       call expect_faults(error, &
          valid//'&load target = ''node'', component = ''X'', value = 1, node = 5 /'//nl//&
          '&load target = ''node'', component = ''Y'', value = 1, node = 0 /', &
-         'c.nml:3: &load node = 5: there is no such node; they are numbered 1..4'//nl//&
+         'c.nml:3: &load node = 5: there is no such node; the numbers are 1..4'//nl//&
          'c.nml:4: &load node = 0: must be at least 1')
    end subroutine node_unknown
 
@@ -163,7 +163,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       call expect_faults(error, &
          valid//'&load value = 1, node = 2 /', &
-         'c.nml:3: &load node = 2: goes with target = ''node'' only')
+         'c.nml:3: &load node = 2: applies only with target = ''node''')
    end subroutine node_forbidden
 
    subroutine moment_on_node(error)
@@ -201,10 +201,10 @@ contains
          valid//'&load value = 1, rate = 2 /'//nl//&
          '&load law = ''table'', times = 0, 1, values = 1, 2, value = 3, rise_time = 1 /'//nl//&
          '&load value = 1, after = ''hold'' /', &
-         'c.nml:3: &load rate = 2: does not go with law = ''constant'''//nl//&
-         'c.nml:4: &load value = 3: does not go with law = ''table'''//nl//&
-         'c.nml:4: &load rise_time = 1: does not go with law = ''table'''//nl//&
-         'c.nml:5: &load after = ''hold'': does not go with law = ''constant''')
+         'c.nml:3: &load rate = 2: does not apply to law = ''constant'''//nl//&
+         'c.nml:4: &load value = 3: does not apply to law = ''table'''//nl//&
+         'c.nml:4: &load rise_time = 1: does not apply to law = ''table'''//nl//&
+         'c.nml:5: &load after = ''hold'': does not apply to law = ''constant''')
    end subroutine law_forbidden
 
    subroutine table_count(error)
@@ -212,8 +212,8 @@ contains
       call expect_faults(error, &
          valid//'&load law = ''table'', times = 0, 1, 2, values = 1, 2 /'//nl//&
          '&load law = ''table'', times = 0, values = 1 /', &
-         'c.nml:3: &load values = 1, 2: must be as many as times: 3, not 2'//nl//&
-         'c.nml:4: &load times = 0: must be two values at least')
+         'c.nml:3: &load values = 1, 2: must have as many values as times: 3, not 2'//nl//&
+         'c.nml:4: &load times = 0: must have at least two values')
    end subroutine table_count
 
    subroutine table_order(error)
@@ -290,7 +290,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(case_config) :: config
       call expect_faults(error, valid//'&solver order = 5 /', &
-         'c.nml:3: &solver order = 5: goes with a method that is named; ''auto'' chooses the order, too')
+         'c.nml:3: &solver order = 5: needs a named method: ''auto'' chooses the order itself')
       if (allocated(error)) return
       call expect_faults(error, valid//'&solver method = ''bdf'', order = 6 /', &
          'c.nml:3: &solver order = 6: must lie in 0..5 when method = ''bdf''')

@@ -28,7 +28,7 @@ contains
          new_test('a text without a key is found', text_without_key), &
          new_test('a second equals sign is found', second_equals), &
          new_test('a key must be a name', bad_key), &
-         new_test('an index must be a whole number or a range', bad_index), &
+         new_test('an index must be an integer or a range', bad_index), &
          new_test('repeat counts are bounded', repeat_count), &
          new_test('a repeat count needs a value', repeat_nothing), &
          new_test('values need a separator between them', glued_values), &
@@ -69,22 +69,22 @@ contains
       type(error_type), allocatable, intent(out) :: error
       call expect_faults(error, &
          valid//'&initial omega = 1e999, rotation = -1.8d308 /', &
-         'c.nml:3: &initial omega = 1e999: is beyond the largest number'//nl//&
-         'c.nml:3: &initial rotation = -1.8d308: is beyond the largest number')
+         'c.nml:3: &initial omega = 1e999: overflows double precision'//nl//&
+         'c.nml:3: &initial rotation = -1.8d308: overflows double precision')
    end subroutine overflow_value
 
    subroutine underflow_value(error)
       type(error_type), allocatable, intent(out) :: error
       call expect_faults(error, &
          valid//'&initial omega = 1e-400 /', &
-         'c.nml:3: &initial omega = 1e-400: is smaller than the smallest number; write 0')
+         'c.nml:3: &initial omega = 1e-400: underflows double precision; write 0')
    end subroutine underflow_value
 
    subroutine long_integer(error)
       type(error_type), allocatable, intent(out) :: error
       call expect_faults(error, &
          valid//'&case n_outputs = 99999999999 /', &
-         'c.nml:3: &case n_outputs = 99999999999: is beyond the largest whole number')
+         'c.nml:3: &case n_outputs = 99999999999: overflows a 32-bit integer')
    end subroutine long_integer
 
    subroutine open_at_end(error)
@@ -112,7 +112,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       call expect_faults(error, &
          valid//'&case title = ''abc'//nl//' t_end = 0 /'//nl, &
-         'c.nml:3: &case title = ''abc: the text does not end on its line: a quote is '//'missing'//&
+         'c.nml:3: &case title = ''abc: the string does not end on its line: a quote is '//'missing'//&
          nl//'c.nml:4: &case t_end = 0: must be positive [s]')
    end subroutine open_string
 
@@ -155,16 +155,16 @@ contains
       type(error_type), allocatable, intent(out) :: error
       call expect_faults(error, &
          valid//'&initial 2omega = 3 /', &
-         'c.nml:3: &initial 2omega: not the name of a key')
+         'c.nml:3: &initial 2omega: not a valid key name')
    end subroutine bad_key
 
    subroutine bad_index(error)
       type(error_type), allocatable, intent(out) :: error
       call expect_faults(error, &
          valid//'&initial phi(1,2) = 3, phi(3:1) = 2, phi(x) = 1 /', &
-         'c.nml:3: &initial phi(1,2): an index is one whole number or a range such as '//'(1:3)'//nl//&
-         'c.nml:3: &initial phi(3:1): an index is one whole number or a range such as '//'(1:3)'//nl//&
-         'c.nml:3: &initial phi(x): an index is one whole number or a range such as (1:3)')
+         'c.nml:3: &initial phi(1,2): an index is one integer or a range such as '//'(1:3)'//nl//&
+         'c.nml:3: &initial phi(3:1): an index is one integer or a range such as '//'(1:3)'//nl//&
+         'c.nml:3: &initial phi(x): an index is one integer or a range such as (1:3)')
    end subroutine bad_index
 
    subroutine repeat_count(error)
@@ -193,7 +193,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       call expect_faults(error, &
          valid//'&case title = ''a'//char(7)//'b'' /', &
-         'c.nml:3: &case title = ''a?b'': control character in a text')
+         'c.nml:3: &case title = ''a?b'': control character in a string')
    end subroutine control_character
 
    subroutine nameless_group(error)
@@ -230,7 +230,7 @@ contains
          '&solver rtol = 0.1 / 2, atol = 1 /'//nl, &
          'c.nml:3: &case t_end = 3/2: fractions are not computed: write 1.5'//nl// &
          'c.nml:3: &case n_outputs = 0: must lie in 1..100000000'//nl// &
-         'c.nml:4: &output file = a/b.h5: a / ends the group; a text with one must be in quotes'//nl// &
+         'c.nml:4: &output file = a/b.h5: a / ends the group; a string with one must be in quotes'//nl// &
          'c.nml:5: &initial omega = pi/2: a / ends the group; fractions are not computed'//nl// &
          'c.nml:6: 2, atol = 1 /: text outside of a group; the / before it ends &solver')
       if (allocated(error)) return
@@ -241,9 +241,9 @@ contains
       type(error_type), allocatable, intent(out) :: error
       call expect_faults(error, &
          valid//'&case title = ''abc, t_end = 0 /'//nl//'&output file = "x /'//nl, &
-         'c.nml:3: &case title = ''abc: the text does not end on its line: a quote is missing'//nl// &
+         'c.nml:3: &case title = ''abc: the string does not end on its line: a quote is missing'//nl// &
          'c.nml:3: &case t_end = 0: must be positive [s]'//nl// &
-         'c.nml:4: &output file = "x: the text does not end on its line: a quote is missing')
+         'c.nml:4: &output file = "x: the string does not end on its line: a quote is missing')
    end subroutine open_string_in_line
 
    subroutine look_alikes(error)
@@ -254,10 +254,10 @@ contains
       call expect_faults(error, &
          valid//'&case'//no_break//'t_end'//no_break//'= 0, title = '//left//'a'//right//' /'//nl// &
          '&initial omega = '//minus//'2, ro'//zero_width//'tation = 1 /'//nl, &
-         'c.nml:3: character U+00A0 is no plain blank: write a blank'//nl// &
-         'c.nml:3: character U+2018 is no plain quote: write '' or "'//nl// &
+         'c.nml:3: character U+00A0 is not an ASCII blank: write a blank'//nl// &
+         'c.nml:3: character U+2018 is not an ASCII quote: write '' or "'//nl// &
          'c.nml:3: &case t_end = 0: must be positive [s]'//nl// &
-         'c.nml:4: character U+2212 is no plain minus: write -'//nl// &
+         'c.nml:4: character U+2212 is not an ASCII minus sign: write -'//nl// &
          'c.nml:4: character U+200B is invisible: delete it')
    end subroutine look_alikes
 
@@ -279,7 +279,7 @@ contains
       if (.not. allocated(error)) call expect_faults(error, char(255)//char(254)//repeat(char(0), 2)//very_wide, &
          'c.nml:1: the file is UTF-32 text; save it as UTF-8')
       if (.not. allocated(error)) call expect_faults(error, valid//char(0), &
-         'c.nml:1: the file is no text: it has bytes that are 0')
+         'c.nml:1: not a text file: it has bytes that are 0')
       if (.not. allocated(error)) call expect_faults(error, '&case t_end = 1 /'//char(13)//'! x'//char(13), &
          'c.nml:1: the lines end in CR alone; save the file with LF or CR LF')
    end subroutine no_text
@@ -314,7 +314,7 @@ contains
          'c.nml:5: &initial rotation = pi: must be a number [rad]; expressions are not computed'//nl// &
          'c.nml:5: &initial alpha(1) = 1;: must be a number [rad]; values are separated by commas or blanks'//nl// &
          'c.nml:6: &initial beta(1) = 1.5, 2, 3: takes one value, not 3; write beta(1:3) for all'//nl// &
-         'c.nml:7: &output file = my, result: must be a text in quotes')
+         'c.nml:7: &output file = my, result: must be a quoted string')
    end subroutine no_numbers
 
    subroutine misspelt(error)

@@ -581,7 +581,7 @@ contains
       call new_scene(scene, config, refusal)
       call check(error, refusal%message, "&load law = 'step': must be 'constant', 'table', 'sine_squared', 'smooth_step', "// &
                  "'ramp' or 'sine'"//nl// &
-                 "&load(2) node = 3: goes with target = 'node' only", 'message')
+                 "&load(2) node = 3: applies only with target = 'node'", 'message')
    end subroutine test_instances
 
 end module test_case_check

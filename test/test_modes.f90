@@ -617,7 +617,7 @@ contains
       call find_equilibrium(motion, 0.0_wp, y, refusal)
       call check(error, allocated(refusal), 'accepted')
       if (allocated(error)) return
-      call check(error, index(refusal%message, 'turn the spacecraft ever faster') > 0, refusal%message)
+      call check(error, index(refusal%message, 'give the spacecraft an angular acceleration') > 0, refusal%message)
    end subroutine no_equilibrium
 
 end module test_modes

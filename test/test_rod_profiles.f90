@@ -331,18 +331,18 @@ contains
 
       call expect(m//'polynomial = 1, -2', 'polynomial = 1, -2: must not be negative anywhere from 0 to 1, but goes down to -1.')
       if (.not. allocated(error)) call expect(m//'polynomial = 1, last_rod = 4', &
-                                              'last_rod = 4: there is no such rod; they are numbered 1..3')
+                                              'last_rod = 4: there is no such rod; the numbers are 1..3')
       if (.not. allocated(error)) call expect(m//'polynomial = 1, first_rod = 3, last_rod = 2', &
                                               'last_rod = 2: must not be less than first_rod = 3')
       if (.not. allocated(error)) call expect(m//'positions = 0, 1', 'values: is required with positions')
       if (.not. allocated(error)) call expect(m//'positions = 0, 1, values = 1, 2, 3', &
-                                              'values = 1, 2, 3: must be as many as positions: 2, not 3')
+                                              'values = 1, 2, 3: must have as many values as positions: 2, not 3')
       if (.not. allocated(error)) call expect(m//'positions = 0, 0.5, values = 1, 2', &
                                               'positions = 0, 0.5: must begin with 0 and end with 1')
-      if (.not. allocated(error)) call expect(m//'positions = 0, 0.5, 0.4, 1, values = 4*1', 'must rise; two equal ones make')
+      if (.not. allocated(error)) call expect(m//'positions = 0, 0.5, 0.4, 1, values = 4*1', 'must increase; two equal ones make')
       if (.not. allocated(error)) call expect(m, 'polynomial: is required unless positions and values are given')
       if (.not. allocated(error)) call expect(m//'polynomial = 1, positions = 0, 1, values = 1, 2', &
-                                              'polynomial = 1: does not go with positions and values')
+                                              'polynomial = 1: cannot be combined with positions and values')
       if (.not. allocated(error)) call expect(ei//'polynomial = 0', 'polynomial = 0: must not be zero everywhere')
       if (.not. allocated(error)) call expect(ei//"polynomial = 1, -1 / &model inertia = 'lumped', bending = 'quasistatic'", &
                                               "must be positive from 0 to 1 when bending = 'quasistatic'")

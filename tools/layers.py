@@ -21,7 +21,7 @@ ORDER = [
     {"case": "a case as it is described: its keys, their units, rules and defaults, for files and for the library"},
     {"scene": "a case compiled: rods, hinge laws, loads, spacecraft",
      "ode": "what an integrator needs to know of a system y' = f(t, y), alone and in vector lanes"},
-    {"input": "namelists read strictly and written; notes on what is hardly meant",
+    {"input": "namelists read strictly and written; notes on what is probably unintended",
      "dynamics": "equations of motion: accelerations, events, energies, linearisation, equilibria, modes",
      "integration": "CVODE, ARKODE and our own methods"},
     {"output": "HDF5 files of runs and modes; whether a run stayed where its model holds",

@@ -380,7 +380,7 @@ contains
          call article_chain(config, n)
          config%initial%phi = [(pi*mod(k, 2), k=1, n)]
          config%chain%kink = [pi, (pi*(2*mod(k, 2) - 1), k=2, n)]
-         call along_motion('folded, let go', config)
+         call along_motion('folded, released', config)
          call article_chain(config, n)
          config%initial%omega = 30.0_wp
          call along_motion('thrown off at 30 rad/s', config)

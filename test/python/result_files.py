@@ -36,7 +36,7 @@ SCENES = {
                 spacecraft="&spacecraft motion = 'fixed' /\n",
                 loads="&load target = 'node', node = 40, component = 'Y', t_end = 0.3, value = 5 /\n"),
     "rigid": case("Rigid rods", 3, "bending = 'rigid'"),
-    "lumped": case("Lumped rods, bending without inertia", 3, "inertia = 'lumped', bending = 'quasistatic'"),
+    "lumped": case("Lumped rods, quasistatic bending", 3, "inertia = 'lumped', bending = 'quasistatic'"),
     "failed": case("A run that fails", 2, extra="&solver method = 'dop853', max_steps = 40 /\n"),
     "no_ledger": case("No ledger", 2, extra="&output ledger = .false. /\n"),
     "rest": case("At rest", 2, loads=""),

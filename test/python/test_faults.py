@@ -114,7 +114,7 @@ def test_energies_of_a_chain_at_rest_are_no_endless_work(tmp_path, method, scene
 
 def test_more_fixed_steps_than_permitted_are_refused(place):
     (place / "case.nml").write_text(CASE + "&solver method = 'dop853', fixed_step = 1e-300 /\n")
-    refused(rodyn("check", "case.nml", cwd=place), "fixed_step = 1e-300: would make more than max_steps")
+    refused(rodyn("check", "case.nml", cwd=place), "fixed_step = 1e-300: would take more than max_steps")
 
 
 # Sizes
@@ -587,7 +587,7 @@ def test_a_directory_that_cannot_be_made_again_costs_no_result(tmp_path):
         errors = process.communicate(timeout=60)[1]
     assert process.returncode == 1
     [path] = (tmp_path / "elsewhere").iterdir()
-    assert errors.startswith("out/x.h5: its directory was removed and cannot be made again: Not a directory")
+    assert errors.startswith("out/x.h5: its directory was removed and cannot be recreated: Not a directory")
     assert errors.endswith(f"the result is '{path}'\n")
     with h5py.File(path) as run:
         assert run.attrs["status"] == b"done" and run["time"][-1] == 6

@@ -169,13 +169,13 @@ def test_a_hinge_is_held_or_not(here):
 
 
 @pytest.mark.parametrize(("key", "message"), [
-    ("hinge(3).rest_angle", "the base has 2 groups &hinge; the number in parentheses counts them in the order of the file"),
-    ("hinge.rest_angle", "the base has 2 groups &hinge; say which, as in hinge(1).rest_angle"),
+    ("hinge(3).rest_angle", "the base has 2 groups &hinge; the index counts them in the order of the file"),
+    ("hinge.rest_angle", "the base has 2 groups &hinge; specify one, as in hinge(1).rest_angle"),
     ("hinge(0).rest_angle", "a key is written group.name"),
     ("hinge(2).rest_angle(1)", "takes no index"),
     ("load(1).value", "the base has no group &load"),
-    ("chain(1).length", "&chain stands once and takes no number: chain.length"),
-    ("chain.length(4)", "there is no such rod; they are numbered 1..3"),
+    ("chain(1).length", "&chain is not repeatable: write chain.length"),
+    ("chain.length(4)", "there is no such rod; the numbers are 1..3"),
     ("kink_program(2).values(4)", "there is no such element; the list has 3, numbered from 1"),
     ("rod_profile(1).values(1)", "the base gives no list whose element this could be"),
 ])
@@ -187,7 +187,7 @@ def test_groups_and_elements_that_are_not_there(here, key, message):
 def test_one_key_by_two_names_is_one_key(here):
     (here / "base.nml").write_text(BASE.replace("&load component = 'X', t_end = 1, value = 10 /", ""))
     text = "&sweep base = 'base.nml' /\n&axis key = 'load.value', values = 1 /\n&axis key = 'load(1).value', values = 2 /"
-    assert "the key has an axis already" in sweep(here, text, code=2).stderr
+    assert "the key already has an axis" in sweep(here, text, code=2).stderr
 
 
 def test_an_axis_along_another_stays_with_it_in_a_grid(here):
@@ -506,7 +506,7 @@ def test_frequencies_have_the_same_bytes_in_every_way(here, how):
     damaged = bytearray(shard.read_bytes())
     damaged[-200] ^= 1
     shard.write_bytes(damaged)  # one result is done again
-    assert "checksum wrong; set aside, 3 good results" in sweep(here, None).stderr
+    assert "wrong checksum; set aside, 3 intact results" in sweep(here, None).stderr
     assert content(here / "s") == wanted
 
 
@@ -537,7 +537,7 @@ def test_frequencies_at_equilibria_are_those_of_rodyn_modes(here):
     assert list(opened(here, "t").status) == ["done", "failed"] and failed.returncode == 1
     assert "a load or a kink varies in time" in str(opened(here, "t").message.values[1])
     refused = sweep(here, text.format("&axis key = 'case.t_end', values = 1").replace("frequencies = 2, ", ""), name="u", code=2)
-    assert "goes with frequencies only" in refused.stderr
+    assert "applies only with frequencies" in refused.stderr
 
 
 def test_frequencies_alone_cost_no_integration(here):
@@ -748,7 +748,7 @@ def test_good_results_of_a_damaged_open_shard_are_kept(here, damage):
     if damage == "empty":  # as by a kill before the first word: nothing to tell
         assert result.stderr == "" and not kept
     else:
-        assert f"{shard.name}: checksum wrong; set aside, {len(good)} good results" in result.stderr or damage == "odd"
+        assert f"{shard.name}: wrong checksum; set aside, {len(good)} intact results" in result.stderr or damage == "odd"
         assert "set aside" in result.stderr and kept == [bytes(data)]
     sweep(here, SHORT, name="whole")
     assert content(here / "s") == content(here / "whole")
@@ -777,7 +777,7 @@ def test_damage_is_noticed_and_redone(here):
     data[len(data) // 2] ^= 4
     shard.write_bytes(data)
     result = sweep(here, None)
-    assert "checksum wrong; set aside, 5 good results" in result.stderr and content(here / "s") == wanted
+    assert "wrong checksum; set aside, 5 intact results" in result.stderr and content(here / "s") == wanted
     assert list(here.glob("s/shards/*.damaged")) and (here / "s" / "sweep-1.h5").exists()
     assert len(results(here / "s")) == 6 and len(set(results(here / "s")) - set(there)) == 1
     next(here.glob("s/shards/*.shard")).unlink()
@@ -846,7 +846,7 @@ def test_defaults_are_a_valid_sweep(here):
     ("&sweep base = 'base.nml' /\n&axis key = 'mass_ratio', values = 0 /", "must be positive"),
     ("&sweep base = 'base.nml' /\n&axis key = 'solver.method', text_values = 'rk4' /", "must be 'auto'"),
     ("&sweep base = 'base.nml' /\n&axis key = 'solver.method', values = 1 /", "takes text_values"),
-    ("&sweep base = 'base.nml' /\n&axis key = 'case.n_outputs', values = 1.5 /", "must be a whole number"),
+    ("&sweep base = 'base.nml' /\n&axis key = 'case.n_outputs', values = 1.5 /", "must be an integer"),
     ("&sweep base = 'base.nml' /\n&axis key = 'case.t_end', values = 1, -1 /", "value 2 (-1) must be positive [s]"),
     ("&sweep base = 'base.nml' /\n&axis key = 'load.value', values = 1 /", "load(1).value"),
     ("&sweep base = 'base.nml' /\n&axis key = 'output.file', text_values = 'x' /", "has no influence"),

@@ -52,7 +52,7 @@ contains
       if (limits(2) < 0 .or. limits(2) >= least_stack) then
          if (posix_setrlimit(rlimit_stack, [least_stack, limits(2)]) == 0) return
       end if
-      call raise(error, 'rodyn: the stack may have only '//byte_text(real(limits(1), wp))//', and '// &
+      call raise(error, 'rodyn: the stack is limited to '//byte_text(real(limits(1), wp))//', but '// &
                  byte_text(real(least_stack, wp))//' are needed: raise ulimit -s', exit_bad_input)
    end subroutine ensure_stack
 

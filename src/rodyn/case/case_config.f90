@@ -258,7 +258,7 @@ contains
          example='4000.0', help='torsional spring C of each hinge'))
       call visitor%field(chain%hinge_damping, key('hinge_damping', 'N m s/rad', hinges, rule=not_negative, &
          help='viscous damper D of each hinge'))
-      call visitor%field(chain%kink, key('kink', 'rad', hinges, help='imposed break gamma of the axis at each hinge'))
+      call visitor%field(chain%kink, key('kink', 'rad', hinges, help='imposed kink gamma at each hinge'))
       call visitor%close_group()
    end subroutine visit_chain
 
@@ -406,14 +406,14 @@ contains
       integer, intent(in) :: instance
       type(hinge_config), intent(inout) :: hinge
       call visitor%open_group(group('hinge', repeatable=.true., &
-         help='more of one hinge: angles are joint rotations from its kink; repeat or leave out'), instance)
+         help='further laws of one hinge; angles are joint rotations; repeat the group, or leave it out'), instance)
       call visitor%field(hinge%hinge, key('hinge', rule=not_negative, default='required', example='0', help='hinge 0..n-1'))
       call visitor%field(hinge%held, key('held', help='locked at its initial angle until it is released'))
       call visitor%field(hinge%release_time, key('release_time', 's', rule=in_range, low=0.0_wp, high=1.0e9_wp, default='depends', &
          when='default: never', help='a held hinge is released'))
       call visitor%field(hinge%release_after, key('release_after', rule=not_negative, default='depends', when='default: none', &
          help='a held hinge is released when that hinge latches'))
-      call visitor%field(hinge%rest_angle, key('rest_angle', 'rad', help='angle at which the spring is slack'))
+      call visitor%field(hinge%rest_angle, key('rest_angle', 'rad', help='joint rotation at which the spring has no moment'))
       call visitor%field(hinge%freeplay, key('freeplay', 'rad', rule=not_negative, &
          help='the spring acts beyond this rotation from its rest angle, to either side'))
       call visitor%field(hinge%freeplay_stiffness, key('freeplay_stiffness', 'N m/rad', rule=not_negative, &
@@ -426,7 +426,7 @@ contains
       call visitor%field(hinge%stop_damping, key('stop_damping', 'N m s/rad', rule=not_negative, &
          help='of both stops, which push but never pull'))
       call visitor%field(hinge%latch_angle, key('latch_angle', 'rad', rule=between, low=-1.0e3_wp, high=1.0e3_wp, &
-         default='depends', when='default: none', help='angle on reaching which the hinge locks for good'))
+         default='depends', when='default: none', help='angle at which the hinge latches: locks for good'))
       call visitor%field(hinge%lock_stiffness, key('lock_stiffness', 'N m/rad', rule=not_negative, &
          help='of a spring that locks the hinge; 0: a constraint'))
       call visitor%field(hinge%lock_damping, key('lock_damping', 'N m s/rad', rule=not_negative, &
@@ -442,21 +442,21 @@ contains
       type(solver_config), intent(inout) :: solver
       call visitor%open_group(group('solver', help='integration in time'), 1)
       call visitor%word_field(solver%method, key('method', words='auto|'//method_words, &
-         help='auto chooses; gauss, dop853: our own, order 16 and 8; erk: ARKODE; adams, bdf: CVODE, errors add up'))
+         help='auto chooses; gauss (order 16), dop853 (8): built in; erk: ARKODE; adams, bdf: CVODE, errors add up'))
       call visitor%field(solver%rtol, key('rtol', rule=between, low=0.0_wp, high=1.0_wp, &
-         help='relative tolerance; at the end of a run errors may be up to 100 times that'))
+         help='relative tolerance of a step; errors at the end of a run may be 100 times that'))
       call visitor%field(solver%atol, key('atol', rule=positive, &
          help='absolute tolerance of all states; zero would leave states at rest without a scale'))
       call visitor%field(solver%order, key('order', rule=in_range, low=0.0_wp, high=real(maxval(methods%highest_order), wp), &
-         help="highest order, with a method named; 0: the choice of the method"))
-      call visitor%field(solver%max_step, key('max_step', 's', rule=not_negative, help='longest step; 0: no bound'))
+         help="maximum order, of a named method; 0: its default"))
+      call visitor%field(solver%max_step, key('max_step', 's', rule=not_negative, help='maximum step; 0: no limit'))
       call visitor%field(solver%fixed_step, key('fixed_step', 's', rule=not_negative, &
          help="constant step of erk, dop853 or gauss; 0: adaptive"))
       call visitor%field(solver%allow_unstable, key('allow_unstable', &
          help='take a fixed_step beyond the stability limit of erk or dop853, which is refused otherwise'))
-      call visitor%field(solver%max_steps, key('max_steps', rule=at_least, low=1.0_wp, help='most steps of the whole run'))
+      call visitor%field(solver%max_steps, key('max_steps', rule=at_least, low=1.0_wp, help='maximum number of steps in the run'))
       call visitor%field(solver%max_events, key('max_events', rule=at_least, low=1.0_wp, &
-         help='most events of hinges in the whole run'))
+         help='maximum number of hinge events in the run'))
       call visitor%close_group()
    end subroutine visit_solver
 

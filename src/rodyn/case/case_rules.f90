@@ -189,7 +189,7 @@ contains
       key = 'polynomial'
       if (judge%is_given('rod_profile', i, 'positions') .or. judge%is_given('rod_profile', i, 'values')) then
          if (judge%is_given('rod_profile', i, key)) then
-            call judge%blame('rod_profile', i, key, 'does not go with positions and values')
+            call judge%blame('rod_profile', i, key, 'cannot be combined with positions and values')
             return
          end if
          key = 'values'
@@ -225,13 +225,13 @@ contains
       ok = .false.
       associate (p => profile%positions, n => size(profile%positions))
          if (size(profile%values) /= n) then
-            call judge%blame('rod_profile', i, 'values', 'must be as many as positions: '//to_text(n)//', not '// &
+            call judge%blame('rod_profile', i, 'values', 'must have as many values as positions: '//to_text(n)//', not '// &
                to_text(size(profile%values)))
          else if (n < 2 .or. any(abs(p([1, n]) - [0.0_wp, 1.0_wp]) > 0.0_wp)) then
             call judge%blame('rod_profile', i, 'positions', 'must begin with 0 and end with 1')
          else if (any(p(2:) < p(:n - 1)) .or. any(p(3:) <= p(:n - 2)) .or. p(2) <= 0.0_wp .or. p(n - 1) >= 1.0_wp) then
             call judge%blame('rod_profile', i, 'positions', &
-               'must rise; two equal ones make a jump, but not three, nor at the ends')
+               'must increase; two equal ones make a jump, but not three, nor at the ends')
          else
             ok = .true.
          end if
@@ -248,7 +248,7 @@ contains
       if (.not. judge%is_sound('solver', 1, 'method')) return
       method = method_named(config%solver%method)
       rule = order_rule(method, config%solver%order)
-      if (len_trim(method%name) == 0 .and. len(rule) > 0) rule = "goes with a method that is named; 'auto' chooses the order, too"
+      if (len_trim(method%name) == 0 .and. len(rule) > 0) rule = "needs a named method: 'auto' chooses the order itself"
       if (len(rule) > 0 .and. judge%is_sound('solver', 1, 'order')) call judge%blame('solver', 1, 'order', rule)
       if (.not. config%solver%fixed_step > 0.0_wp) return
       if (.not. method%fixed_steps) then
@@ -256,7 +256,7 @@ contains
       else if (.not. (judge%is_sound('case', 1, 't_end') .and. judge%is_sound('solver', 1, 'max_steps'))) then
          return
       else if (config%t_end/config%solver%max_steps > config%solver%fixed_step) then
-         call judge%blame('solver', 1, 'fixed_step', 'would make more than max_steps = '// &
+         call judge%blame('solver', 1, 'fixed_step', 'would take more than max_steps = '// &
                     to_text(config%solver%max_steps)//' steps until t_end = '//short_text(config%t_end)//' [s]')
       end if
    end subroutine check_solver
@@ -271,7 +271,7 @@ contains
       if (.not. judge%is_sound('load', i, 'target')) return
       if (load%target == 'spacecraft') then
          if (.not. judge%is_given('load', i, 'node')) return
-         call judge%blame('load', i, 'node', "goes with target = 'node' only")
+         call judge%blame('load', i, 'node', "applies only with target = 'node'")
          return
       end if
       call judge%require('load', i, 'node', "when target = 'node'")

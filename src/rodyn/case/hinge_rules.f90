@@ -78,7 +78,7 @@ contains
       type(hinge_config), intent(in) :: hinges(:)
       if (.not. judge%is_sound('hinge', i, 'hinge')) return
       if (any(hinges(:i - 1)%hinge == hinges(i)%hinge)) call judge%blame('hinge', i, 'hinge', &
-         'this hinge has a group &hinge already')
+         'this hinge already has a group &hinge')
    end subroutine check_once
 
    !> Only what is held can be released, by one cause, and only what latches can release others.
@@ -92,11 +92,11 @@ contains
       by_time = judge%is_given('hinge', i, 'release_time')
       by_latch = judge%is_given('hinge', i, 'release_after')
       if (judge%is_sound('hinge', i, 'held') .and. .not. hinges(i)%held) then
-         if (by_time) call judge%blame('hinge', i, 'release_time', 'goes with held = .true. only')
-         if (by_latch) call judge%blame('hinge', i, 'release_after', 'goes with held = .true. only')
+         if (by_time) call judge%blame('hinge', i, 'release_time', 'applies only with held = .true.')
+         if (by_latch) call judge%blame('hinge', i, 'release_after', 'applies only with held = .true.')
          return
       end if
-      if (by_time .and. by_latch) call judge%blame('hinge', i, 'release_after', 'excludes release_time')
+      if (by_time .and. by_latch) call judge%blame('hinge', i, 'release_after', 'cannot be combined with release_time')
       if (.not. by_latch .or. .not. judge%is_sound('hinge', i, 'release_after')) return
       do k = 1, size(hinges)
          if (hinges(k)%hinge == hinges(i)%release_after .and. hinges(k)%latch_angle < none_given .and. k /= i) return
@@ -114,15 +114,15 @@ contains
          call judge%blame('hinge', i, 'upper_stop', 'must be greater than lower_stop')
       if (min(hinge%lower_stop, hinge%upper_stop) < none_given) then
          if (.not. hinge%stop_stiffness > 0.0_wp .and. judge%is_sound('hinge', i, 'stop_stiffness')) &
-            call judge%blame('hinge', i, 'stop_stiffness', 'is required with a stop, and positive')
+            call judge%blame('hinge', i, 'stop_stiffness', 'is required with a stop and must be positive')
       else if (hinge%stop_stiffness > 0.0_wp .or. hinge%stop_damping > 0.0_wp) then
          if (judge%is_sound('hinge', i, 'lower_stop') .and. judge%is_sound('hinge', i, 'upper_stop')) &
-            call judge%blame('hinge', i, 'stop_stiffness', 'goes with lower_stop or upper_stop only')
+            call judge%blame('hinge', i, 'stop_stiffness', 'applies only with lower_stop or upper_stop')
       end if
       if (hinge%freeplay_stiffness > 0.0_wp .and. .not. hinge%freeplay > 0.0_wp) &
-         call judge%blame('hinge', i, 'freeplay_stiffness', 'goes with freeplay only')
+         call judge%blame('hinge', i, 'freeplay_stiffness', 'applies only with freeplay')
       if (hinge%lock_damping > 0.0_wp .and. .not. hinge%lock_stiffness > 0.0_wp) &
-         call judge%blame('hinge', i, 'lock_damping', 'goes with lock_stiffness only')
+         call judge%blame('hinge', i, 'lock_damping', 'applies only with lock_stiffness')
    end subroutine check_stops
 
    !> Moment and velocity of dry friction go together.
@@ -136,7 +136,7 @@ contains
       if (hinge%friction_moment > 0.0_wp .and. .not. hinge%friction_velocity > 0.0_wp) then
          call judge%blame('hinge', i, 'friction_velocity', 'is required when friction_moment > 0')
       else if (hinge%friction_velocity > 0.0_wp .and. .not. hinge%friction_moment > 0.0_wp) then
-         call judge%blame('hinge', i, 'friction_velocity', 'goes with friction_moment only')
+         call judge%blame('hinge', i, 'friction_velocity', 'applies only with friction_moment')
       end if
    end subroutine check_friction
 

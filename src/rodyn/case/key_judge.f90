@@ -50,7 +50,7 @@ contains
       character(len=*), intent(in) :: what
       integer, intent(in) :: first, last
       character(len=:), allocatable :: rule
-      rule = 'there is no such '//what//'; they are numbered '//to_text(first)//'..'//to_text(last)
+      rule = 'there is no such '//what//'; the numbers are '//to_text(first)//'..'//to_text(last)
    end function no_such
 
 end module rodyn_key_judge

@@ -50,7 +50,7 @@ contains
          if (taken) then
             call judge%require(group, i, trim(keys(k)), "when law = '"//trim(law)//"'")
          else
-            call judge%blame(group, i, trim(keys(k)), "does not go with law = '"//trim(law)//"'")
+            call judge%blame(group, i, trim(keys(k)), "does not apply to law = '"//trim(law)//"'")
          end if
       end do
    end subroutine check_keys
@@ -116,7 +116,7 @@ contains
       integer :: k
 
       if (.not. gives(judge, group, i, 'times')) return
-      if (size(times) < 2) call judge%blame(group, i, 'times', 'must be two values at least')
+      if (size(times) < 2) call judge%blame(group, i, 'times', 'must have at least two values')
       do k = 2, size(times)
          if (follows(k)) cycle
          rule = 'must increase, but value '
@@ -126,7 +126,7 @@ contains
          exit
       end do
       if (.not. gives(judge, group, i, 'values')) return
-      if (size(values) /= size(times)) call judge%blame(group, i, 'values', 'must be as many as times: '// &
+      if (size(values) /= size(times)) call judge%blame(group, i, 'values', 'must have as many values as times: '// &
                                                   to_text(size(times))//', not '//to_text(size(values)))
 
    contains

@@ -117,7 +117,7 @@ contains
       character(len=:), allocatable :: text
       select case (row%type)
       case (type_integer)
-         text = 'must be a whole number'
+         text = 'must be an integer'
       case (type_real)
          text = 'must be a number'
       case (type_logical)
@@ -125,7 +125,7 @@ contains
       case (type_word)
          text = word_rule(row%words)
       case default
-         text = 'must be a text in quotes'
+         text = 'must be a quoted string'
       end select
       text = text//unit_text(row)
    end function requirement

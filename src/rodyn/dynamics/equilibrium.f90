@@ -98,14 +98,14 @@ contains
          call iterate(solver, motion, t, y, ok, error)
          if (allocated(error)) return
          if (.not. ok) then
-            call raise(error, "no equilibrium was found near the initial state: neither Newton's method nor a slow motion "// &
+            call raise(error, "no equilibrium was found near the initial state: neither Newton's method nor a creeping motion "// &
                        'leads to one from there')
             return
          end if
          if (.not. laws_change(motion, t, y)) return
          if (maxval(abs(y - before)) <= close_enough) return
       end do
-      call raise(error, 'no equilibrium was found: laws of hinges (stops, freeplay) follow each other without end')
+      call raise(error, 'no equilibrium was found: the hinge laws (stops, freeplay) do not settle')
    end subroutine find_with_laws
 
    !> Let the hinges take the laws that hold at a state. Do these differ from those they had?
@@ -144,7 +144,7 @@ contains
             if (ok) call newton_step(solver, motion, step, ok)
             if (ok .and. singular) ok = maxval(abs(step)) <= close_enough
             if (singular .and. .not. ok) &
-               call raise(error, 'no equilibrium: the stiffness is singular (a hinge without spring?)')
+               call raise(error, 'no equilibrium: the tangent stiffness is singular (a hinge without spring?)')
             if (.not. ok) return
             x = y(b + 1:r)
             if (maxval(abs(step)) <= close_enough) then
@@ -363,7 +363,7 @@ contains
          ! The derivatives of the accelerations tell of their rounding errors.
          if (ok) ok = abs(spin_rate) <= 1.0e3_wp*epsilon(1.0_wp)*max(1.0_wp, maxval(abs(jac(r + 3:r + m, :))))
          if (ok) return
-         call raise(error, "no equilibrium: the loads turn the spacecraft ever faster, omega' = "// &
+         call raise(error, "no equilibrium: the loads give the spacecraft an angular acceleration, omega' = "// &
                     formatted(spin_rate, '(es10.3)')//' rad/s^2')
       end associate
    end subroutine check_spin

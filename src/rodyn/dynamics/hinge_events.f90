@@ -207,7 +207,7 @@ contains
             mechanism%held = mechanism%held .and. mechanism%release_time > 0.0_wp
             if (mechanism%held) call mechanism%lock(at(k))
             if (mechanism%is_constrained() .and. abs(turning(k)) > 1.0e-9_wp) then
-               call raise(error, 'hinge '//to_text(k)//' is held, but turns at the start')
+               call raise(error, 'hinge '//to_text(k)//' is held but has an initial rate')
                return
             end if
             call mechanism%choose_laws(at(k), merge(0.0_wp, turning(k), dynamics%scene%quasistatic))
@@ -543,7 +543,7 @@ contains
    function no_balance(t) result(text)
       real(wp), intent(in) :: t
       character(len=:), allocatable :: text
-      text = 'at t = '//time_text(t)//' s no laws of hinges (stops, freeplay, friction) were found that hold together'
+      text = 'at t = '//time_text(t)//' s no consistent set of hinge laws (stops, freeplay, friction) was found'
    end function no_balance
 
    !> Take down an event. Too many of them, in all or in no time, are an error.
@@ -574,7 +574,7 @@ contains
          if (self%log(i)%hinge /= hinge) cycle
          found = found + 1
          if (found < crowd) cycle
-         call raise(error, 'events accumulate at t = '//time_text(t)//' s: hinge '//to_text(hinge)//' had '//to_text(crowd)// &
+         call raise(error, 'chatter at t = '//time_text(t)//' s: hinge '//to_text(hinge)//' had '//to_text(crowd)// &
                     ' within '//time_text(max(t - self%log(i)%time, tiny(t)))//' s, the last one '//trim(kind_names(kind))// &
                     '; softer stops, more damping or a larger friction_velocity may help')
          return

@@ -121,8 +121,8 @@ contains
          first = checked%before(k - 1) + 1
          do i = first + 1, checked%before(k)
             call checked%faults%add(checked%document%groups(checked%known(i))%line, '&'//trim(checked%groups(k)%name) &
-               //': the group may stand only once, and begins in line ' &
-               //to_text(checked%document%groups(checked%known(first))%line)//' already')
+               //': the group must not be repeated; the first one is in line ' &
+               //to_text(checked%document%groups(checked%known(first))%line))
          end do
       end do
    end subroutine check_single_groups

@@ -229,8 +229,8 @@ contains
             if (document%entries(e)%indexed) then
                if (checked%ok(e)) indexed(r) = .true.
             else
-               if (whole(r) > 0) call reject(checked, g, e, 'the key stands in line ' &
-                  //to_text(whole(r) - 1)//' already')
+               if (whole(r) > 0) call reject(checked, g, e, 'duplicate key, first given in line ' &
+                  //to_text(whole(r) - 1))
                if (whole(r) == 0) whole(r) = document%entries(e)%line + 1
             end if
          end do
@@ -279,8 +279,8 @@ contains
          if (entry%lower < lbound(owner, 1) .or. entry%upper > ubound(owner, 1)) return
          do i = entry%lower, entry%upper
             if (owner(i) > 0 .and. .not. entry%forced) then
-               call reject(checked, g, e, 'element '//to_text(i)//' is given in line ' &
-                  //to_text(checked%document%entries(owner(i))%line)//' already')
+               call reject(checked, g, e, 'element '//to_text(i)//' is given twice, first in line ' &
+                  //to_text(checked%document%entries(owner(i))%line))
                return
             end if
             owner(i) = e

@@ -11,8 +11,8 @@ module rodyn_namelist_characters
    !> What is taken for what.
    integer, parameter :: blank = 1, quote = 2, dash = 3, invisible = 4
    character(len=1), parameter :: plain(4) = [' ', '''', '-', ' '] !! nothing, for the invisible
-   character(len=*), parameter :: rules(4) = [character(len=40) :: ' is no plain blank: write a blank', &
-                                              ' is no plain quote: write '' or "', ' is no plain minus: write -', &
+   character(len=*), parameter :: rules(4) = [character(len=40) :: ' is not an ASCII blank: write a blank', &
+                                              ' is not an ASCII quote: write '' or "', ' is not an ASCII minus sign: write -', &
                                               ' is invisible: delete it']
 
 contains
@@ -34,7 +34,7 @@ contains
       else if (index(text, little_endian) == 1 .or. index(text, big_endian) == 1 .or. 5*zeros > 2*len(text)) then
          reason = 'the file is UTF-16 text; save it as UTF-8'
       else if (zeros > 0) then
-         reason = 'the file is no text: it has bytes that are 0'
+         reason = 'not a text file: it has bytes that are 0'
       else if (index(text, lf) == 0 .and. index(text, cr) > 0) then
          reason = 'the lines end in CR alone; save the file with LF or CR LF'
       end if

@@ -35,13 +35,13 @@ contains
       call parse_one(name, text, fresh, s, error)
       if (allocated(error)) return
       if (instance == 0 .and. group_count(document, group) > 1) then
-         call raise(error, key//': the group stands '//to_text(group_count(document, group)) &
-            //' times; say which, as in '//group//'(1).'//name, exit_bad_input)
+         call raise(error, key//': there are '//to_text(group_count(document, group)) &
+            //' such groups; specify one, as in '//group//'(1).'//name, exit_bad_input)
          return
       end if
       g = find_group(document, group, max(1, instance))
       if (g == 0 .and. instance > 1) then
-         call raise(error, key//': there is no such group; it stands '//to_text(group_count(document, group))//' times', &
+         call raise(error, key//': there is no such group; the number of them is '//to_text(group_count(document, group)), &
                     exit_bad_input)
          return
       end if
@@ -148,7 +148,7 @@ contains
             if (document%entries(e)%key == wanted%key .and. .not. document%entries(e)%indexed) exit
          end do
          if (e > document%groups(g)%last) then
-            call raise(error, key//': the base gives no list whose element this could be', exit_bad_input)
+            call raise(error, key//': the base has no array with such an element', exit_bad_input)
             return
          end if
          allocate (list(0))
@@ -157,7 +157,7 @@ contains
          end do
          list%copies = 1
          if (wanted%lower < 1 .or. wanted%upper > size(list)) then
-            call raise(error, key//': there is no such element; the list has '//to_text(size(list))//', numbered from 1', &
+            call raise(error, key//': there is no such element; the array has '//to_text(size(list))//', numbered from 1', &
                        exit_bad_input)
             return
          end if

@@ -323,11 +323,11 @@ contains
       entry%line = s%line
       entry%faulty = .not. is_name(key)
       if (entry%faulty) then
-         call fault_in_group(document, s%line, text, 'not the name of a key')
+         call fault_in_group(document, s%line, text, 'not a valid key name')
       else if (index(text, '(') > 0) then
          call parse_index(text(index(text, '(') + 1:index(text, ')') - 1), entry)
          if (entry%faulty) call fault_in_group(document, s%line, text, &
-            'an index is one whole number or a range such as (1:3)')
+            'an index is one integer or a range such as (1:3)')
       end if
       call add_entry(document, entry)
    end subroutine parse_key
@@ -477,7 +477,7 @@ contains
       else if (any(divisor%kind == numbers)) then
          call complain(document, value%line, 'a / ends the group; fractions are not computed', document%text(value%first:last))
       else
-         call complain(document, value%line, 'a / ends the group; a text with one must be in quotes', &
+         call complain(document, value%line, 'a / ends the group; a string with one must be in quotes', &
                        document%text(value%first:last))
       end if
    end subroutine complain_of_slash
@@ -537,10 +537,10 @@ contains
       value%last = s%at - merge(2, 1, closed)
       if (.not. closed) then
          call resume_in_line(document, s, value)
-         call complain(document, value%line, 'the text does not end on its line: a quote is missing', &
+         call complain(document, value%line, 'the string does not end on its line: a quote is missing', &
             document%text(value%first - 1:value%last))
       else if (control) then
-         call complain(document, value%line, 'control character in a text', shown_value(document, value))
+         call complain(document, value%line, 'control character in a string', shown_value(document, value))
       end if
    end subroutine parse_string
 

@@ -50,7 +50,7 @@ contains
          if (.not. satisfies(row, value%x)) rule = rule_text(row)
       case (is_long_integer)
          if (row%type == type_integer) then
-            rule = 'is beyond the largest whole number'
+            rule = 'overflows a 32-bit integer'
          else if (.not. satisfies(row, value%x)) then
             rule = rule_text(row)
          end if
@@ -61,9 +61,9 @@ contains
             rule = rule_text(row)
          end if
       case (is_too_large)
-         rule = 'is beyond the largest number'
+         rule = 'overflows double precision'
       case (is_too_small)
-         rule = 'is smaller than the smallest number; write 0'
+         rule = 'underflows double precision; write 0'
       case (is_not_finite)
          rule = 'must be finite'
       case default

@@ -280,8 +280,8 @@ contains
       character(len=:), allocatable :: text
       character(len=8) :: steps
       write (steps, '(i0)') judged_steps
-      text = 'no end in sight at t = '//time_text(t)//' s: the last '//trim(steps)//' steps made '//time_text(done)// &
-             ' s; loads or initial values far out of proportion?'
+      text = 'no progress at t = '//time_text(t)//' s: the last '//trim(steps)//' steps advanced '//time_text(done)// &
+             ' s; are loads or initial values out of scale?'
    end function hopeless_text
 
    !> Report when it is time, and choose how many steps and outputs to make until the next look: about 20 ms of them.

@@ -203,7 +203,7 @@ contains
       if (allocated(error)) return
       if (len(failure) == 0) failure = sync_path(self%temporary_path)
       if (len(failure) > 0) then
-         call raise(error, self%temporary_path//': the result could not be put onto the disk: '//failure)
+         call raise(error, self%temporary_path//': the result could not be flushed to disk: '//failure)
          return
       end if
 
@@ -217,10 +217,10 @@ contains
          call raise(error, self%path//": appeared while this run was computing and is left alone; this run's result is '"// &
             self%temporary_path//"'", exit_bad_input)
       else if (len(failure) > 0) then
-         call raise(error, self%path//": cannot be given its name: "//failure//"; the result is '"//self%temporary_path//"'")
+         call raise(error, self%path//": cannot be renamed: "//failure//"; the result is '"//self%temporary_path//"'")
       else
          failure = sync_path(parent_directory(self%path))
-         if (len(failure) > 0) call raise(error, self%path//': its name could not be put onto the disk: '//failure)
+         if (len(failure) > 0) call raise(error, self%path//': its name could not be flushed to disk: '//failure)
       end if
    end subroutine put_on_disk
 
@@ -237,7 +237,7 @@ contains
       if (len(failure) == 0) return
       elsewhere = free_temporary_name(temporary_directory()//'/'//self%path(index(self%path, '/', back=.true.) + 1:))
       if (len(self%copy_to(elsewhere)) > 0) return
-      call raise(error, self%path//': its directory was removed and cannot be made again: '//failure// &
+      call raise(error, self%path//': its directory was removed and cannot be recreated: '//failure// &
                  "; the result is '"//elsewhere//"'")
    end subroutine bring_back
 

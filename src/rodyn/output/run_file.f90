@@ -253,7 +253,7 @@ contains
       if (allocated(error)) deallocate (error) ! no room, which `finish` tells
       failure = self%reserve(bytes_at_end + size(names)*(bytes_of_layout + bytes_of_node) + size(time)*bytes_per_event)
       if (len(failure) > 0) then
-         if (.not. allocated(self%no_room)) self%no_room = 'events find no room: '//failure
+         if (.not. allocated(self%no_room)) self%no_room = 'events cannot be written: '//failure
          return
       end if
       call self%file%create_group(events_group, error)
@@ -296,7 +296,7 @@ contains
       if (present(message)) reason = message
       if (outcome == 'failed' .and. self%force) call step_aside(self%path)
       warnings = text_or_empty(report%warnings)
-      if (len(self%reserve(bytes_at_end + len(warnings))) > 0) warnings = 'left out for want of room'
+      if (len(self%reserve(bytes_at_end + len(warnings))) > 0) warnings = 'left out: no space left'
       call self%write_solver_report(report, error)
       if (.not. allocated(error)) call self%file%put_attribute('/', 't_reached', self%last_time, error)
       if (.not. allocated(error)) call self%file%put_attribute('/', 'warnings', warnings, error)
@@ -421,7 +421,7 @@ contains
       end do
       if (self%written < self%waiting) then
          self%waiting = self%written
-         self%no_room = self%path//': rows after t = '//short_text(self%last_time)//' s find no room: '//failure
+         self%no_room = self%path//': rows after t = '//short_text(self%last_time)//' s cannot be written: '//failure
          call raise(error, self%no_room)
       end if
       if (self%waiting < self%block_rows) return

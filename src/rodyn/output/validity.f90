@@ -150,7 +150,7 @@ contains
 
       associate (rod => self%rods(k))
          text = 'rod '//to_text(k)//' bends by '//two_digits(rod%deflection)//' of its length (t = '// &
-                time_text(rod%t_deflection)//' s); the model takes bending to be small: above '// &
+                time_text(rod%t_deflection)//' s); the model assumes small deflections: above '// &
                 'deflection_limit = '//two_digits(self%deflection_limit)//' its chord is more than '// &
                 two_digits(100.0_wp*8.0_wp/3.0_wp*self%deflection_limit**2)//' % too long'
       end associate
@@ -167,9 +167,9 @@ contains
 
       text = 'rod '//to_text(k)//' vibrates at '//two_digits(vibration(self%rods(k), self%n_seen))// &
              ' times its own first frequency ('//two_digits(self%rods(k)%own_frequency)// &
-             ' rad/s, which one rod has 11 % too fast); it would be better cut in two'
+             ' rad/s, which one rod overestimates by 11 %); divide it into two rods'
       associate (others => count(vibration(self%rods, self%n_seen) > frequency_share) - 1)
-         if (others > 0) text = text//', as would '//more_rods(others)
+         if (others > 0) text = text//', and '//more_rods(others)//' likewise'
       end associate
    end function vibration_warning
 

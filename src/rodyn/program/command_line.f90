@@ -84,7 +84,7 @@ contains
       case ('')
          call raise(error, help_text(''), exit_bad_input)
       case default
-         call raise(error, "rodyn: there is no command '"//command//"'"//nl//help_text(''), exit_bad_input)
+         call raise(error, "rodyn: unknown command '"//command//"'"//nl//help_text(''), exit_bad_input)
       end select
       exit_code = exit_done
       if (.not. allocated(error)) return
@@ -306,7 +306,7 @@ contains
       select case (kind)
       case ('run', 'sweep')
          if (command_argument_count() > 2) then
-            call raise(error, "rodyn defaults: '"//argument(3)//"' is too much", exit_bad_input)
+            call raise(error, "rodyn defaults: unexpected argument '"//argument(3)//"'", exit_bad_input)
             return
          end if
          if (kind == 'run') text = default_case()
@@ -390,10 +390,10 @@ contains
          else if (index(word, '--output=') == 1 .and. argument(1) /= 'check') then
             options%output = word(len('--output=') + 1:)
          else if (index(word, '-') == 1 .and. len(word) > 1) then
-            call raise(error, 'rodyn '//argument(1)//": there is no option '"//word//"'", exit_bad_input)
+            call raise(error, 'rodyn '//argument(1)//": unknown option '"//word//"'", exit_bad_input)
             return
          else if (allocated(options%file)) then
-            call raise(error, 'rodyn '//argument(1)//": one file at a time; '"//word//"' is too much", exit_bad_input)
+            call raise(error, 'rodyn '//argument(1)//": one file at a time; unexpected argument '"//word//"'", exit_bad_input)
             return
          else
             options%file = word
@@ -401,7 +401,7 @@ contains
          i = i + 1
       end do
       if (.not. allocated(options%file)) &
-         call raise(error, 'rodyn '//argument(1)//': which file?'//nl//help_text(argument(1)), exit_bad_input)
+         call raise(error, 'rodyn '//argument(1)//': no file given'//nl//help_text(argument(1)), exit_bad_input)
    end subroutine read_options
 
    !> Argument i, whole.

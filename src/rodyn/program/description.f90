@@ -20,14 +20,14 @@ contains
       uses = ''
       skips = ''
       call note(scene%n_base > 0, 'free spacecraft')
-      call note(scene%dynamic_bending, 'bending as motion')
-      if (scene%quasistatic) call note(.true., 'bending without inertia')
+      call note(scene%dynamic_bending, 'dynamic bending')
+      if (scene%quasistatic) call note(.true., 'quasistatic bending')
       call note(.not. scene%lumped, 'rod inertia')
       call note(scene%dynamic_bending .and. scene%consistent, 'second-order inertia')
       call note(scene%hinges%has_damping, 'dampers')
       call note(any(abs(scene%kinks%constant) > 0.0_wp) .or. scene%hinges%driven, 'kinks')
       if (scene%hinges%driven) call note(.true., 'driven kinks')
-      if (size(scene%hinges%mechanisms) > 0) call note(.true., 'laws of hinges')
+      if (size(scene%hinges%mechanisms) > 0) call note(.true., 'hinge laws')
       call note_loads()
       call note(ledger, 'ledger')
       text = 'scene   '//count_text(scene%n, 'rod')//' ('//count_text(size(scene%rods), 'distinct kind')//'), '// &

@@ -29,7 +29,7 @@ contains
 
       text = ''
       if (ledger .and. scene%dynamic_bending .and. .not. scene%consistent) &
-         text = "formulation 'paper' has no exact energy: the energy residual includes the formulation's own"
+         text = "formulation 'paper' has no exact energy: the energy residual includes the defect of the formulation"
       do i = 1, size(scene%loads%loads)
          associate (law => scene%loads%loads(i)%law)
             if (.not. law%drops() .or. .not. any(same_time(scene%switches, law%t_end))) cycle

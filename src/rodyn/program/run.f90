@@ -169,7 +169,7 @@ contains
       self%started = .true.
       call fill_row(motion, t, y, self%initial_energy, self%row)
       if (.not. is_finite(self%row)) then
-         call raise(error, 'at t = '//time_text(t)//' s: states or energies beyond all numbers')
+         call raise(error, 'at t = '//time_text(t)//' s: states or energies overflow')
          return
       end if
       if (self%residual > 0) then
@@ -308,7 +308,7 @@ contains
       outcome = 'done'
       if (allocated(failure)) outcome = merge('stopped', 'failed ', failure%exit_code == exit_stopped)
       call print_line(outcome//'t = '//time_text(t)//' s, '//to_text(stats%n_steps)//' steps, '// &
-         to_text(stats%n_rhs)//' right-hand sides, '//formatted(seconds, '(f20.3)')//' s')
+         to_text(stats%n_rhs)//' right-hand-side evaluations, '//formatted(seconds, '(f20.3)')//' s')
       call print_lines('method ', driver%history)
       if (motion%ledger) call print_line('ledger  largest energy residual '// &
          formatted(recorder%worst_residual, '(es8.1)')//' J of '//formatted(recorder%energy_scale, '(es8.1)')//' J')

@@ -114,7 +114,7 @@ contains
       end if
       engine%stopped = engine%ranks%add(at_stopped, 0) > 0
       if (.not. allocated(error) .and. engine%ranks%add(at_errors, 0) > 0) &
-         call raise(error, engine%directory%path//': a rank could not go on (see above); run again to resume')
+         call raise(error, engine%directory%path//': a rank failed (see above); run again to resume')
       if (allocated(error)) then
          call engine%progress%finish('incomplete', engine%counts)
       else if (engine%stopped) then
@@ -173,7 +173,7 @@ contains
             ': has neither &sweep nor &axis, so it is no sweep; rodyn run computes a case', exit_bad_input)
          if (.not. allocated(error)) call parse_sweep(input, .true., engine%sweep, error)
          if (engine%ranks%launched > 1 .and. engine%ranks%count == 1 .and. .not. allocated(error)) &
-            call raise(error, to_text(engine%ranks%launched)//' processes were started, but MPI connects none of them; '// &
+            call raise(error, to_text(engine%ranks%launched)//' processes were started, but MPI does not connect them; '// &
                        'try srun --mpi=pmix, or --shard', exit_bad_input)
          if (engine%ranks%count > 1 .and. engine%options%n_shards > 0 .and. .not. allocated(error)) &
             call raise(error, '--shard is for single processes; ranks of MPI share the cases by themselves', exit_bad_input)

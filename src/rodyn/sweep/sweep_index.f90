@@ -151,12 +151,12 @@ contains
       call read_journals(self%directory, self%journals)
       call self%journals%missing(self%directory, names)
       do i = 1, size(names)
-         call notices%tell('shard '//trim(names(i))//': sealed, but not there; its cases are done again')
+         call notices%tell('shard '//trim(names(i))//': sealed but missing; its cases are recomputed')
          call write_journal(self%directory, tag, 'gone', trim(names(i)), 0, 0_i8, error)
          if (allocated(error)) return
       end do
       if (self%journals%n_damaged > 0) call notices%tell('journal: '//to_text(self%journals%n_damaged)// &
-                                                         ' damaged line(s) passed over')
+                                                         ' damaged line(s) skipped')
    end subroutine tell_of_missing
 
    !> Was this the checksum of sweep.h5 when it was merged, and from these very results?

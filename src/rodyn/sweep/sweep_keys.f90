@@ -90,7 +90,7 @@ contains
       call visitor%field(axis%values, key('values', extent=any_list, default='depends', example='2, 4, 8', &
          when='this, text_values, or start to count', help='numbers'))
       call visitor%texts_field(axis%text_values, key('text_values', extent=any_list, default='depends', &
-         when='for keys that take texts', help="texts, such as 'bdf', 'erk'"))
+         when='for keys that take strings', help="strings, such as 'bdf', 'erk'"))
       call visitor%field(axis%start, key('start', default='depends', when='with stop and count', help='first number'))
       call visitor%field(axis%stop, key('stop', default='depends', when='with start and count', help='last number'))
       call visitor%field(axis%count, key('count', rule=in_range, low=1.0_wp, high=1.0e6_wp, default='depends', &

@@ -48,13 +48,13 @@ contains
          fault = 'truncated'
       end if
       if (left_open .and. file_bytes(path) == 0) fault = '' ! killed before the first word
-      if (len(fault) == 0 .and. path_exists(directory//'/shards/'//sealed_name)) fault = 'another has its name'
+      if (len(fault) == 0 .and. path_exists(directory//'/shards/'//sealed_name)) fault = 'a sealed shard has its name'
       if (len(fault) == 0) then
          call finish(directory, sealed_name, tag, shard_header(fingerprint), extent, error)
       else
          call salvage(directory, name, sealed_name, tag, words(:extent%used), extent, error)
          if (.not. allocated(error)) call notices%tell('shard '//name//': '//fault//'; set aside, '// &
-            to_text(extent%n_records)//' good results of it are kept')
+            to_text(extent%n_records)//' intact results of it are kept')
       end if
    end subroutine mend_shard
 

@@ -66,7 +66,7 @@ contains
       call index%close()
       if (.not. allocated(error)) then
          failure = sync_path(path)
-         if (len(failure) > 0) call raise(error, path//': cannot be put onto the disk: '//failure)
+         if (len(failure) > 0) call raise(error, path//': cannot be written: '//failure)
       end if
       if (.not. allocated(error)) return
       error%message = error%message//'; all results are safe in the shards, run again to merge them'
@@ -240,7 +240,7 @@ contains
       call make_texts('message', message_length, 'why the case failed; or which methods gave up, and warnings on its model')
       call make('t_reached', [integer ::], 'real', 's', 'time of the last output before it failed; of a done case its end')
       call make('n_steps', [integer ::], 'integer', '1', 'internal steps')
-      call make('n_rhs', [integer ::], 'integer', '1', 'right-hand sides')
+      call make('n_rhs', [integer ::], 'integer', '1', 'right-hand-side evaluations')
       call make('same_as', [integer ::], 'integer', '1', 'first case with the same values, the one that was computed')
       call make('wall_seconds', [integer ::], 'real', 's', 'wall time of the case')
       if (shape%n_modes > 0) then

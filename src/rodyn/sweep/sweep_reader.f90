@@ -126,7 +126,7 @@ contains
       end do
 
       if (sweep%frequencies_at == 'equilibrium' .and. sweep%frequencies == 0) &
-         call blame(checked, 'sweep', 1, 'frequencies_at', 'goes with frequencies only')
+         call blame(checked, 'sweep', 1, 'frequencies_at', 'applies only with frequencies')
       if (.not. sweep%integrate) then
          if (sweep%frequencies == 0) call blame(checked, 'sweep', 1, 'integrate', &
                                                 'leaves nothing to compute unless frequencies is positive')
@@ -196,7 +196,7 @@ contains
          end if
       end if
       if (keys%spacing == 'log' .and. .not. by_range) &
-         call blame(checked, 'axis', i, 'spacing', 'goes with start, stop and count only')
+         call blame(checked, 'axis', i, 'spacing', 'applies only with start, stop and count')
 
    contains
 
@@ -336,7 +336,7 @@ contains
                if (matching_word(row, trim(axis%texts(k))) == 0) rule = rule_text(row)
             end if
          else if (row%type == type_integer .and. .not. is_whole(axis%numbers(k))) then
-            rule = 'must be a whole number'
+            rule = 'must be an integer'
          else if (.not. satisfies(row, axis%numbers(k))) then
             rule = rule_text(row)
          end if
@@ -383,16 +383,16 @@ contains
       if (n == 1) has = 'the base has one group &'//group
       if (.not. repeatable) then
          ok = instance == 0
-         if (.not. ok) call blame(checked, 'axis', i, 'key', '&'//group//' stands once and takes no number: '//group//'.'//name)
+         if (.not. ok) call blame(checked, 'axis', i, 'key', '&'//group//' is not repeatable: write '//group//'.'//name)
       else if (n == 0) then
          ok = .false.
          call blame(checked, 'axis', i, 'key', 'the base has no group &'//group)
       else if (instance > n) then
          ok = .false.
-         call blame(checked, 'axis', i, 'key', has//'; the number in parentheses counts them in the order of the file')
+         call blame(checked, 'axis', i, 'key', has//'; the index counts them in the order of the file')
       else if (instance == 0 .and. n > 1) then
          ok = .false.
-         call blame(checked, 'axis', i, 'key', has//'; say which, as in '//group//'(1).'//name)
+         call blame(checked, 'axis', i, 'key', has//'; specify one, as in '//group//'(1).'//name)
       end if
    end subroutine check_instance
 
@@ -417,10 +417,10 @@ contains
 
       do i = 1, size(sweep%axes)
          if (index(sweep%axes(i)%key, 'chain.node_mass') == 1 .and. any(sweep%axes%key == 'mass_ratio')) &
-            call blame(checked, 'axis', i, 'key', 'mass_ratio sets the node masses already')
+            call blame(checked, 'axis', i, 'key', 'mass_ratio already sets the node masses')
          do k = 1, i - 1
             if (full_key(trim(sweep%axes(k)%key)) /= full_key(trim(sweep%axes(i)%key))) cycle
-            call blame(checked, 'axis', i, 'key', 'the key has an axis already')
+            call blame(checked, 'axis', i, 'key', 'the key already has an axis')
             exit
          end do
       end do

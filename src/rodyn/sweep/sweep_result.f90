@@ -59,7 +59,7 @@ contains
       if (path_exists(path)) call rename_aside(path, directory//'/sweep', '.h5', aside, failure)
       if (len(failure) == 0) call rename_new(temporary, path, taken, failure)
       if (len(failure) == 0) failure = sync_path(parent_directory(path))
-      if (len(failure) > 0) call raise(error, path//': cannot be put onto the disk: '//failure// &
+      if (len(failure) > 0) call raise(error, path//': cannot be written: '//failure// &
                                        '; all results are safe in the shards, run again to merge them')
       if (len(failure) == 0) failure = remove_file(directory//'/'//replaced_name) ! if there is one
    end subroutine write_result

@@ -76,7 +76,7 @@ contains
             extent%sealed = .true.
             return
          else ! look for the next good record: there is hardly a word that could be its first but is not
-            fault = 'checksum wrong'
+            fault = 'wrong checksum'
             at = at + 1
          end if
       end do
@@ -113,7 +113,7 @@ contains
       if (size(words) < header_words) then
          fault = 'truncated'
       else if (words(1) /= magic .or. words(3) /= crc64(words(:2))) then
-         fault = 'header wrong'
+         fault = 'wrong header'
       else if (words(2) /= fingerprint) then
          fault = 'belongs to another sweep'
       end if

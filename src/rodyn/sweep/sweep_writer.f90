@@ -170,8 +170,8 @@ contains
       character(len=*), intent(in) :: failure
       type(error_type), allocatable, intent(out) :: error
       if (path_exists(parent_directory(self%name))) then
-         call raise(error, self%name//open_ending//': results cannot be put onto the disk: '//failure// &
-                    '; run again to resume with all before them')
+         call raise(error, self%name//open_ending//': results cannot be written: '//failure// &
+                    '; run again to resume with all earlier ones')
       else
          call raise(error, self%directory//': was removed, and all results with it')
       end if
