@@ -33,6 +33,7 @@ contains
       type(unittest), allocatable, intent(out) :: suite(:)
       suite = [ &
          new_test('the checksum is the published one', published_checksum), &
+         new_test('a sweep names its base', base_is_named), &
          new_test('the last axis of a grid runs fastest', grid_order), &
          new_test('equal cases are those of equal values', equal_cases), &
          new_test('the mass ratio is that of all nodes to all rods', ratio_of_masses), &
@@ -53,6 +54,17 @@ contains
       call parse_sweep(input, .true., sweep, error)
       if (.not. allocated(error)) call new_plan(plan, sweep, error)
    end subroutine new_sweep
+
+   subroutine base_is_named(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(input_texts) :: input
+      type(sweep_config) :: sweep
+      type(error_type), allocatable :: refusal
+      call new_input_texts(input, "&sweep base = '' / &axis key = 'case.t_end', values = 1, 2 /", 's.nml')
+      call parse_sweep(input, .true., sweep, refusal)
+      call check(error, allocated(refusal), 'accepted')
+      if (.not. allocated(error)) call check(error, refusal%message, "s.nml:1: &sweep base = '': must not be empty", 'message')
+   end subroutine base_is_named
 
    !> CRC-64/XZ of '123456789' is 995DC9BBDF1939FA; words and text agree.
    subroutine published_checksum(error)

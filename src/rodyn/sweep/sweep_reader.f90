@@ -87,7 +87,11 @@ contains
       if (found) then
          sweep%base_text = input%base_text
          sweep%base_name = input%base_name
-      else if (len_trim(sweep%base) > 0 .and. entry_of(checked, 'sweep', 1, 'base') > 0) then
+      else if (entry_of(checked, 'sweep', 1, 'base') == 0) then
+         return ! which was told
+      else if (len_trim(sweep%base) == 0) then
+         call blame(checked, 'sweep', 1, 'base', 'must not be empty')
+      else
          sweep%base_name = sweep%base
          if (index(sweep%base, '/') /= 1 .and. input%directory /= '.') sweep%base_name = input%directory//'/'//sweep%base
          call read_text_file(sweep%base_name, sweep%base_text, failure)
