@@ -782,7 +782,7 @@ def test_damage_is_noticed_and_redone(here):
     assert len(results(here / "s")) == 6 and len(set(results(here / "s")) - set(there)) == 1
     next(here.glob("s/shards/*.shard")).unlink()
     result = sweep(here, None)
-    assert "sealed, but not there" in result.stderr and content(here / "s") == wanted
+    assert "sealed but missing" in result.stderr and content(here / "s") == wanted
     assert sweep(here, None).stderr == ""
 
 
