@@ -198,17 +198,9 @@ contains
       type(error_type), allocatable :: failure
       logical :: locked(0:self%scene%n - 1)
       real(wp) :: held_at(0:self%scene%n - 1)
-      integer :: i
 
       call self%hinges%set_mechanisms()
-      locked = .false.
-      held_at = 0.0_wp
-      do i = 1, size(self%hinges%mechanisms)
-         associate (mechanism => self%hinges%mechanisms(i))
-            locked(mechanism%hinge) = mechanism%is_constrained()
-            held_at(mechanism%hinge) = mechanism%lock_angle
-         end associate
-      end do
+      call self%hinges%find_locks(locked, held_at)
       call self%set_locked(locked, self%opening_acceleration, held_at, failure)
       if (allocated(self%group)) deallocate (self%group)
       self%group_is_current = .false.

@@ -116,13 +116,7 @@ contains
       at_rest = 0.0_wp
       at_rest(first:last) = q(first:last)
       call openings(scene%n, scene%dynamic_bending, at_rest(first:), opening)
-      relaxed%driven = .false.
-      relaxed%has_offsets = .true.
-      relaxed%constant = 0.0_wp
-      relaxed%friction = 0.0_wp
-      relaxed%steady = 0.0_wp
-      relaxed%bent = 0.0_wp
-      call relaxed%set_kinks(opening, spread(0.0_wp, 1, scene%n))
+      call relaxed%rest_at(opening)
    end subroutine relax
 
    !> The faster root of lambda^2 + damping lambda + stiffness = 0.

@@ -16,7 +16,6 @@ module rodyn_hinge_events
    use rodyn_hinge_mechanism, only: hinge_mechanism, kind_names, kind_released, kind_latched, &
       part_spring, part_lower, part_upper, part_friction, part_latch
    use rodyn_hinge_law, only: hinge_law, hinge_state, initial_joints, openings
-   use rodyn_case_config, only: none_given
    use rodyn_accelerations, only: dynamics_type
    use rodyn_kinematics, only: elastic_energy
    implicit none (type, external)
@@ -91,7 +90,7 @@ contains
             associate (mechanism => law%mechanisms(i))
                if ((law%quasistatic .and. .not. any(law%relaxing == mechanism%hinge)) .neqv. in_series) cycle
                do j = 1, size(parts)
-                  if (.not. has_part(mechanism, parts(j))) cycle
+                  if (.not. mechanism%has_part(parts(j))) cycle
                   events%mechanism = [events%mechanism, i]
                   events%part = [events%part, parts(j)]
                end do
@@ -100,22 +99,6 @@ contains
       end subroutine add
 
    end subroutine new_event_set
-
-   !> Does the mechanism have this part?
-   pure logical function has_part(mechanism, part)
-      type(hinge_mechanism), intent(in) :: mechanism
-      integer, intent(in) :: part
-      select case (part)
-      case (part_spring)
-         has_part = mechanism%freeplay > 0.0_wp
-      case (part_lower, part_upper)
-         has_part = abs(mechanism%stop(part - part_lower + 1)) < none_given
-      case (part_friction)
-         has_part = mechanism%friction > 0.0_wp
-      case default
-         has_part = mechanism%latch < none_given
-      end select
-   end function has_part
 
    !> Joint rotations and rates into the workspace.
    subroutine find_joints(self, dynamics, t, q, p)

@@ -4,11 +4,11 @@ module rodyn_kinematics
    use rodyn_kinds, only: wp
    use rodyn_scene, only: scene_type
    use rodyn_bending_matrices, only: most_shapes
-   use rodyn_hinge_law, only: hinge_law, hinge_state, hinge_rates, spring_energy
+   use rodyn_hinge_law, only: hinge_law, hinge_state, spring_energy
    use rodyn_three_moments, only: slopes_from_moments
    implicit none (type, external)
    private
-   public :: invariants_type, invariants, load_power, damper_power, slopes, kinetic_energy, elastic_energy
+   public :: invariants_type, invariants, load_power, slopes, kinetic_energy, elastic_energy
 
    !> What the ledger records of a state. Momenta along inertial axes, angular momentum about their origin.
    type :: invariants_type
@@ -188,27 +188,6 @@ contains
          end if
       end associate
    end subroutine slopes
-
-   !> Power that dampers and sliding friction take, sum D th'^2 + f th' [W], in scenes without relaxing hinges.
-   pure subroutine damper_power(scene, hinges, p, rate, power)
-      type(scene_type), intent(in) :: scene
-      type(hinge_law), intent(in) :: hinges
-      real(wp), intent(in) :: p(:)
-      real(wp), intent(inout) :: rate(0:) !! workspace (0:n-1): th' [rad/s]
-      real(wp), intent(out) :: power      !! [W]
-      integer :: k
-
-      power = 0.0_wp
-      if (.not. (hinges%has_damping .or. hinges%has_friction)) return
-      call hinge_rates(hinges, scene%n, scene%dynamic_bending, p(scene%n_base + 1:), rate)
-      do k = 0, scene%n - 1
-         power = power + hinges%damping(k)*rate(k)**2
-      end do
-      if (.not. hinges%has_friction) return
-      do k = 0, scene%n - 1
-         power = power + hinges%friction(k)*rate(k)
-      end do
-   end subroutine damper_power
 
    !> Power of the loads on the spacecraft and on the nodes [W].
    pure real(wp) function load_power(scene, q, p, base_force, loaded, node_force)

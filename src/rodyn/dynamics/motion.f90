@@ -22,8 +22,9 @@ module rodyn_motion
    use rodyn_linearisation, only: balance_tangent
    use rodyn_newton, only: newton_type
    use rodyn_locks, only: has_slaves, reduce, expand, reduce_matrix
-   use rodyn_kinematics, only: load_power, damper_power, invariants_type, invariants
-   use rodyn_hinge_law, only: hinge_moments, hinge_state, relaxation_rates, relaxation_tangent, initial_joints, hinge_tangent
+   use rodyn_kinematics, only: load_power, invariants_type, invariants
+   use rodyn_hinge_law, only: hinge_moments, hinge_state, relaxation_rates, relaxation_tangent, initial_joints, hinge_tangent, &
+      damper_power, relaxing_power
    use rodyn_lapack, only: dpotrf, dpotrs
    implicit none (type, external)
    private
@@ -156,22 +157,17 @@ contains
       real(wp), contiguous, intent(in) :: q(:), p(:)
       real(wp), intent(in) :: joint_rate(:) !! th' of the relaxing hinges [rad/s]
       real(wp), intent(out) :: power(2)     !! [W]
-      integer :: i
 
       power(1) = load_power(self%dynamics%scene, q, p, self%dynamics%forces%base, &
                             self%dynamics%regime%on_nodes, self%dynamics%forces%node)
       if (self%dynamics%driven) power(1) = power(1) + drive_power(self, q, p)
-      if (size(joint_rate) > 0) then
-         associate (d => self%dynamics%hinges%damping, friction => self%dynamics%hinges%friction, &
-                    relaxing => self%dynamics%hinges%relaxing)
-            power(2) = 0.0_wp
-            do i = 1, size(joint_rate)
-               power(2) = power(2) + (d(relaxing(i))*joint_rate(i) + friction(relaxing(i)))*joint_rate(i)
-            end do
-         end associate
-      else
-         call damper_power(self%dynamics%scene, self%dynamics%hinges, p, self%dynamics%work%theta, power(2))
-      end if
+      associate (scene => self%dynamics%scene, hinges => self%dynamics%hinges)
+         if (size(joint_rate) > 0) then
+            power(2) = relaxing_power(hinges, joint_rate)
+         else
+            call damper_power(hinges, scene%n, scene%dynamic_bending, p(scene%n_base + 1:), self%dynamics%work%theta, power(2))
+         end if
+      end associate
    end subroutine powers
 
    !> Power of the drives of moving kinks [W]: -sum T gamma'. Overwrites the moments in the workspace with all of T.

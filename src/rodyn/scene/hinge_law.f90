@@ -21,7 +21,7 @@ module rodyn_hinge_law
    implicit none (type, external)
    private
    public :: hinge_law, new_hinge_law, hinge_moments, hinge_state, hinge_rates, hinge_tangent, openings, relaxation_rates, &
-      relaxation_tangent, initial_joints, spring_energy
+      relaxation_tangent, initial_joints, spring_energy, damper_power, relaxing_power
 
    !> Springs, dampers and kinks of hinges 0..n-1.
    type :: hinge_law
@@ -50,6 +50,9 @@ module rodyn_hinge_law
    contains
       procedure :: lock
       procedure :: fastest_relaxation
+      procedure :: next_release
+      procedure :: find_locks
+      procedure :: rest_at
       procedure :: set_kinks
       procedure :: set_mechanisms
    end type hinge_law
@@ -185,6 +188,45 @@ contains
       self%series = series
       call bend_rods(self)
    end subroutine lock
+
+   !> Which hinges the mechanisms lock by a constraint now, and where.
+   pure subroutine find_locks(self, locked, theta)
+      class(hinge_law), intent(in) :: self
+      logical, intent(out) :: locked(0:) !! (0:n-1)
+      real(wp), intent(out) :: theta(0:) !! th of these (0:n-1) [rad]
+      integer :: i
+
+      locked = .false.
+      theta = 0.0_wp
+      do i = 1, size(self%mechanisms)
+         associate (mechanism => self%mechanisms(i))
+            locked(mechanism%hinge) = mechanism%is_constrained()
+            theta(mechanism%hinge) = mechanism%lock_angle
+         end associate
+      end do
+   end subroutine find_locks
+
+   !> When the next hinge that is held will be released [s].
+   pure real(wp) function next_release(self, t)
+      class(hinge_law), intent(in) :: self
+      real(wp), intent(in) :: t !! [s]
+      associate (mechanisms => self%mechanisms)
+         next_release = minval(mechanisms%release_time, mechanisms%locked .and. mechanisms%release_time > t)
+      end associate
+   end function next_release
+
+   !> Put the kinks where they leave no moment in any hinge, for good.
+   pure subroutine rest_at(self, opening)
+      class(hinge_law), intent(inout) :: self
+      real(wp), intent(in) :: opening(0:) !! (0:n-1) [rad]
+      self%driven = .false.
+      self%has_offsets = .true.
+      self%constant = 0.0_wp
+      self%friction = 0.0_wp
+      self%steady = 0.0_wp
+      self%bent = 0.0_wp
+      call self%set_kinks(opening, spread(0.0_wp, 1, self%n))
+   end subroutine rest_at
 
    !> Hinge moments T(0:n); T(n) = 0 at the free end. The opening of hinge k is phi_{k+1} - phi_k (rigid or
    !> quasistatic rods) or (phi + alpha)_{k+1} - (phi + beta)_k (dynamic bending), phi_0 = beta_0 = 0.
@@ -534,6 +576,42 @@ contains
          end associate
       end do
    end function spring_energy
+
+   !> Power that dampers and sliding friction take, sum D th'^2 + f th' [W], where no hinge is relaxing.
+   pure subroutine damper_power(law, n, flexible, angle_rate, rate, power)
+      type(hinge_law), intent(in) :: law
+      integer, intent(in) :: n
+      logical, intent(in) :: flexible
+      real(wp), intent(in) :: angle_rate(*)
+      real(wp), intent(inout) :: rate(0:n - 1) !! workspace: th' [rad/s]
+      real(wp), intent(out) :: power           !! [W]
+      integer :: k
+
+      power = 0.0_wp
+      if (.not. (law%has_damping .or. law%has_friction)) return
+      call hinge_rates(law, n, flexible, angle_rate, rate)
+      do k = 0, n - 1
+         power = power + law%damping(k)*rate(k)**2
+      end do
+      if (.not. law%has_friction) return
+      do k = 0, n - 1
+         power = power + law%friction(k)*rate(k)
+      end do
+   end subroutine damper_power
+
+   !> The same where hinges are relaxing: these have all dampers.
+   pure real(wp) function relaxing_power(law, rate) result(power)
+      type(hinge_law), intent(in) :: law
+      real(wp), intent(in) :: rate(:) !! th' of the relaxing hinges [rad/s]
+      integer :: i
+
+      power = 0.0_wp
+      do i = 1, size(rate)
+         associate (k => law%relaxing(i))
+            power = power + (law%damping(k)*rate(i) + law%friction(k))*rate(i)
+         end associate
+      end do
+   end function relaxing_power
 
    !> Change of the hinge moments for a change of angles and rates (the law is linear but for its offset). Reactions of
    !> locked hinges are left out where the kernels find them.

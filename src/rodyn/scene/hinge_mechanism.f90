@@ -65,6 +65,8 @@ module rodyn_hinge_mechanism
       integer :: latch_side = 0             !! sign of the way to the latch; 0: there is none
       logical :: at_latch = .false.         !! not latched, but still where it began or was released: at its latch
    contains
+      procedure :: has_part
+      procedure :: law_number
       procedure :: choose_laws
       procedure :: margin
       procedure :: change
@@ -108,6 +110,29 @@ contains
       self%release_after = given%release_after
       self%side = merge(0, 1, given%freeplay > 0.0_wp)
    end subroutine new_mechanism
+
+   !> Has it this part?
+   pure logical function has_part(self, part)
+      class(hinge_mechanism), intent(in) :: self
+      integer, intent(in) :: part
+      select case (part)
+      case (part_spring)
+         has_part = self%freeplay > 0.0_wp
+      case (part_lower, part_upper)
+         has_part = abs(self%stop(part - part_lower + 1)) < none_given
+      case (part_friction)
+         has_part = self%friction > 0.0_wp
+      case default
+         has_part = self%latch < none_given
+      end select
+   end function has_part
+
+   !> The law that it has now, as a number.
+   elemental integer function law_number(self)
+      class(hinge_mechanism), intent(in) :: self
+      law_number = merge(1, 0, self%locked) + merge(2, 0, self%side /= 0) + merge(4, 0, self%touches(1)) + &
+                   merge(8, 0, self%touches(2)) + merge(16, 0, self%slides /= 0)
+   end function law_number
 
    !> Choose the laws that hold at a state to which no motion led. A stop that is left too fast to follow keeps its face there.
    pure subroutine choose_laws(self, theta, theta_rate)

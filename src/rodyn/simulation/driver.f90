@@ -41,7 +41,7 @@ module rodyn_driver
 
    !> What was chosen for some laws of hinges.
    type :: verdict_type
-      integer, allocatable :: laws(:) !! see `laws_of`
+      integer, allocatable :: laws(:) !! numbers of the laws of mechanisms
       integer :: member = 0
       character(len=:), allocatable :: reason
       real(wp) :: pace = 0.0_wp       !! of the best even method [s]
@@ -149,7 +149,7 @@ contains
       logical :: out(size(candidates))
       integer :: i
 
-      t_until = min(self%t_end, next_release(motion, t))
+      t_until = min(self%t_end, motion%dynamics%hinges%next_release(t))
       out = self%members%gave_up
       call choose_method(choice, self%options, motion, y(:motion%n_controlled), t, t_until, &
                          nint(self%n_outputs*((t_until - t)/self%t_end)), out, most_trial(self), self%monitor)
@@ -164,7 +164,7 @@ contains
       end do
       self%pace = 0.0_wp
       if (self%on_probation) return
-      verdict = verdict_type(laws_of(motion), member, choice%reason(), &
+      verdict = verdict_type(motion%dynamics%hinges%mechanisms%law_number(), member, choice%reason(), &
                              merge(choice%pace, 0.0_wp, choice%tried .and. member > n_even), &
                              member > n_even .and. choice%advantage > clear_advantage)
       self%pace = verdict%pace
@@ -184,34 +184,6 @@ contains
          most_trial = max(trials_free, trials_free + trial_share*effort_of_run(self) - self%tried)
    end function most_trial
 
-   !> When the next hinge that is held will be released [s].
-   pure real(wp) function next_release(motion, t)
-      type(motion_type), intent(in) :: motion
-      real(wp), intent(in) :: t
-      integer :: i
-      next_release = huge(1.0_wp)
-      associate (mechanisms => motion%dynamics%hinges%mechanisms)
-         do i = 1, size(mechanisms)
-            if (mechanisms(i)%locked .and. mechanisms(i)%release_time > t) &
-               next_release = min(next_release, mechanisms(i)%release_time)
-         end do
-      end associate
-   end function next_release
-
-   !> The law that each mechanism has now, as a number.
-   pure function laws_of(motion) result(laws)
-      type(motion_type), intent(in) :: motion
-      integer, allocatable :: laws(:)
-      integer :: i
-      allocate (laws(size(motion%dynamics%hinges%mechanisms)))
-      do i = 1, size(laws)
-         associate (law => motion%dynamics%hinges%mechanisms(i))
-            laws(i) = merge(1, 0, law%locked) + merge(2, 0, law%side /= 0) + merge(4, 0, law%touches(1)) + &
-                      merge(8, 0, law%touches(2)) + merge(16, 0, law%slides /= 0)
-         end associate
-      end do
-   end function laws_of
-
    !> Where the verdict on some laws stands; 0: there is none.
    pure integer function place_of(self, laws)
       type(driver_type), intent(in) :: self
@@ -226,7 +198,7 @@ contains
    !> Where the verdict on today's laws stands; 0: there is none, or its method has given up.
    pure integer function known_verdict(self)
       type(driver_type), intent(in) :: self
-      known_verdict = place_of(self, laws_of(self%motion))
+      known_verdict = place_of(self, self%motion%dynamics%hinges%mechanisms%law_number())
       if (known_verdict == 0) return
       if (self%members(self%verdicts(known_verdict)%member)%gave_up) known_verdict = 0
    end function known_verdict
