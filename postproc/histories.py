@@ -42,7 +42,8 @@ def by_unit(quantities: Sequence[Quantity]) -> list[tuple[str, list[Quantity]]]:
     panels: dict[str, list[Quantity]] = {}
     for quantity in quantities:
         panels.setdefault(quantity.unit, []).append(quantity)
-    return [("; ".join(dict.fromkeys(q.meaning.split(" of rod")[0] for q in group)), group) for group in panels.values()]
+    titles = ("; ".join(dict.fromkeys(q.meaning.split(" (")[0] for q in group)) for group in panels.values())
+    return [(style.shorten(title, 110 if len(panels) == 1 else 54), group) for title, group in zip(titles, panels.values(), strict=True)]
 
 
 def draw(run: Run, panels: Sequence[tuple[str, Sequence[Quantity]]], title: str) -> Figure:

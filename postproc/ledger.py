@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from rodyn_data import Run, open_run
 
-ENERGIES = ["energy_kinetic", "energy_elastic", "energy_dissipated", "work_external"]
+ENERGIES = {"energy_kinetic": "kinetic", "energy_elastic": "elastic", "energy_dissipated": "dissipated", "work_external": "work"}
 
 
 def plot(file: str | pathlib.Path, out: str | pathlib.Path) -> Figure:
@@ -34,7 +34,7 @@ def draw(run: Run) -> Figure:
     time = run.time
     figure, grid = style.new_figure(2, 2, sharex=True)
     figure.suptitle("Ledger: " + style.shorten(run.title, 68) + style.status_suffix(run.status, time[-1]))
-    lines(grid[0, 0], time, [q._replace(symbol=q.meaning) for q in energies])
+    lines(grid[0, 0], time, [q._replace(symbol=ENERGIES[q.name]) for q in energies])
     grid[0, 0].set(ylabel=f"energy [{energies[0].unit}]")
     grid[0, 0].set_title("energies", loc="left")
     style.legend_above(grid[0, 0], ncols=2)

@@ -22,8 +22,6 @@ import numpy as np
 from figures import Picture, pictures
 from natural_frequencies import natural_frequencies
 from rodyn_data import (
-    LEDGER_SYMBOLS,
-    SPACECRAFT_SYMBOLS,
     VERSION_ATTRIBUTES,
     DataError,
     Run,
@@ -111,7 +109,7 @@ def run_facts(run: Run) -> list[tuple[str, str]]:
 
 
 def ranges(run: Run) -> str:
-    names = [n for n in [*SPACECRAFT_SYMBOLS, *LEDGER_SYMBOLS] if n in run.file] + [f"phi({k})" for k in sorted({1, run.n_rods})]
+    names = run.numbers() + [f"phi({k})" for k in sorted({1, run.n_rods})]
     rows = []
     for name in names:
         q = run.quantity(name)

@@ -1,4 +1,4 @@
-"""Run, sweep and benchmark files of Rodyn. Names of data sets, units and symbols stand here and nowhere else.
+"""Run, sweep and benchmark files of Rodyn. What a data set runs over, its unit and its meaning are read from the file.
 
     with open_run("example.h5") as run:
         phi_4 = run.quantity("phi(4)")   # values, symbol, unit
@@ -48,61 +48,33 @@ class Event(NamedTuple):
 
 TIME = "time"
 PROBE_TIME = "probe_time"  # of sweeps
-ROD_SYMBOLS = {
-    "phi": r"\varphi", "alpha": r"\alpha", "beta": r"\beta",
-    "phi_rate": r"\dot{\varphi}", "alpha_rate": r"\dot{\alpha}", "beta_rate": r"\dot{\beta}",
-    "bubble": "c", "bubble_rate": r"\dot{c}",  # with three bending shapes
-}
-SPACECRAFT_SYMBOLS = {
+SYMBOLS = {  # for matplotlib; others are called by their names
+    "phi": r"\varphi", "alpha": r"\alpha", "beta": r"\beta", "bubble": "c",
+    "phi_rate": r"\dot{\varphi}", "alpha_rate": r"\dot{\alpha}", "beta_rate": r"\dot{\beta}", "bubble_rate": r"\dot{c}",
     "velocity_x": "V_x", "velocity_y": "V_y", "omega": r"\omega",
     "displacement_x": "u_x", "displacement_y": "u_y", "rotation": r"\theta",
-}
-LEDGER_SYMBOLS = {
     "energy_kinetic": "T", "energy_elastic": r"\Pi", "energy_dissipated": "E_D", "work_external": "W",
     "energy_residual": "r_E", "momentum_x": "P_X", "momentum_y": "P_Y", "angular_momentum": "L",
+    "frequency": r"\Omega", "damping_ratio": r"\zeta",  # of sweeps
 }
-MODE_SYMBOLS = {"frequency": r"\Omega", "damping_ratio": r"\zeta"}  # of sweeps
+LEDGER = ("energy_", "work_", "momentum_", "angular_momentum")  # how names of the ledger begin
 MODES_SHOWN = 4  # without being asked
-SYMBOLS = ROD_SYMBOLS | SPACECRAFT_SYMBOLS | LEDGER_SYMBOLS | MODE_SYMBOLS
-UNITS = (
-    dict.fromkeys(["phi", "alpha", "beta", "rotation"], "rad")
-    | dict.fromkeys(["phi_rate", "alpha_rate", "beta_rate", "omega", "frequency"], "rad s-1")
-    | dict.fromkeys(["velocity_x", "velocity_y", "bubble_rate"], "m s-1")
-    | dict.fromkeys(["displacement_x", "displacement_y", "bubble"], "m")
-)
-MEANINGS = {
-    "phi": "chord angle", "alpha": "slope at the inner end", "beta": "slope at the outer end",
-    "bubble": "deflection by the third shape", "bubble_rate": "rate of the deflection by the third shape",
-    "phi_rate": "rate of the chord angle", "alpha_rate": "rate of the inner slope", "beta_rate": "rate of the outer slope",
-    "velocity_x": "velocity along the moving x axis", "velocity_y": "velocity along the moving y axis",
-    "omega": "angular velocity", "displacement_x": "displacement along the moving x axis",
-    "displacement_y": "displacement along the moving y axis", "rotation": "rotation of the spacecraft",
-    "energy_kinetic": "kinetic energy", "energy_elastic": "elastic energy", "energy_dissipated": "dissipated energy",
-    "work_external": "work of loads and kinks", "energy_residual": "energy residual",
-    "momentum_x": "linear momentum, inertial X", "momentum_y": "linear momentum, inertial Y",
-    "angular_momentum": "angular momentum", "frequency": "natural frequency", "damping_ratio": "damping ratio",
-}
 RATE_OF = {
     "phi": "phi_rate", "alpha": "alpha_rate", "beta": "beta_rate", "bubble": "bubble_rate",
     "displacement_x": "velocity_x", "displacement_y": "velocity_y", "rotation": "omega",
 }
 FINAL = "final_"  # states at the end of each case of a sweep
-FINAL_PER_ROD = [FINAL + name for name in ROD_SYMBOLS]
-# Axes of sweeps and columns of sweep files: symbol or words, unit.
-PARAMETERS = {
-    "mass_ratio": ("total node mass / total rod mass", ""),
-    "case.n_outputs": ("number of output intervals", ""), "case.t_end": ("end of the simulated time", "s"),
-    "spacecraft.mass": (r"mass of the spacecraft $M_0$", "kg"), "spacecraft.inertia": (r"inertia $J_0$", "kg m2"),
-    "spacecraft.hinge_x": (r"hinge place $x_0$", "m"), "spacecraft.hinge_y": (r"hinge place $y_0$", "m"),
-    "chain.n_rods": (r"number of rods $n$", ""), "chain.length": (r"length $l$", "m"),
-    "chain.mass_per_length": (r"mass per length $m$", "kg m-1"),
-    "chain.bending_stiffness": (r"bending stiffness $EI$", "N m2"), "chain.node_mass": (r"node mass $\mu$", "kg"),
-    "chain.hinge_stiffness": (r"hinge stiffness $C$", "N m rad-1"),
-    "chain.hinge_damping": (r"hinge damping $D$", "N m s rad-1"), "chain.kink": (r"kink $\gamma$", "rad"),
-    "model.inertia": ("inertia", ""), "model.formulation": ("formulation", ""), "model.bending": ("bending", ""),
-    "solver.rtol": ("relative tolerance", ""), "solver.atol": ("absolute tolerance", ""),
-    "solver.fixed_step": (r"step $\Delta t$", "s"), "solver.max_step": ("longest step", "s"), "solver.method": ("method", ""),
-    "n_rhs": ("right-hand-side evaluations", ""), "wall_seconds": ("wall time", "s"), "t_reached": ("time reached", "s"),
+WORDS = {  # for axes of sweeps and columns of sweep files; others are called by their keys
+    "mass_ratio": "total node mass / total rod mass", "case.n_outputs": "number of output intervals",
+    "case.t_end": "end of the simulated time", "spacecraft.mass": r"mass of the spacecraft $M_0$",
+    "spacecraft.inertia": r"inertia $J_0$", "spacecraft.hinge_x": r"hinge place $x_0$", "spacecraft.hinge_y": r"hinge place $y_0$",
+    "chain.n_rods": r"number of rods $n$", "chain.length": r"length $l$", "chain.mass_per_length": r"mass per length $m$",
+    "chain.bending_stiffness": r"bending stiffness $EI$", "chain.node_mass": r"node mass $\mu$",
+    "chain.hinge_stiffness": r"hinge stiffness $C$", "chain.hinge_damping": r"hinge damping $D$", "chain.kink": r"kink $\gamma$",
+    "model.inertia": "inertia", "model.formulation": "formulation", "model.bending": "bending",
+    "solver.rtol": "relative tolerance", "solver.atol": "absolute tolerance", "solver.fixed_step": r"step $\Delta t$",
+    "solver.max_step": "longest step", "solver.method": "method",
+    "n_rhs": "right-hand-side evaluations", "wall_seconds": "wall time", "t_reached": "time reached",
 }
 VERSION_ATTRIBUTES = [
     "program_version", "git_commit", "compiler", "compiler_options", "sundials_version", "hdf5_version", "hostname", "created",
@@ -146,12 +118,47 @@ def symbol_text(name: str, rod: int | None = None) -> str:
     return f"${symbol}$" if rod is None else f"${symbol}_{{{rod}}}$"
 
 
-class Run:
-    """One run file. Data sets are read when they are asked for."""
+class ResultFile:
+    """What run and sweep files have in common. Data sets are read when they are asked for."""
 
     def __init__(self, path: str | pathlib.Path, file: h5py.File):
         self.path = pathlib.Path(path)
         self.file = file
+
+    def attributes(self) -> dict[str, Any]:
+        return {name: text_of(value) for name, value in self.file.attrs.items()}
+
+    def dimensions(self, name: str) -> list[str]:
+        """What a data set runs over, as its dimension scales say: time and rod; case, probe_time and rod; ..."""
+        return [dimension[0].name.rpartition("/")[2] if len(dimension) else "" for dimension in self.file[name].dims]
+
+    def place(self, name: str, counted: str | None, number: int | None) -> int | None:
+        """Where entry `number` of dimension `counted` stands, rod 4 or hinge 0; None where nothing counts."""
+        if counted is None:
+            if number is not None:
+                raise DataError(f"{self.path}: '{name}' does not belong to a rod, a hinge, a node or a mode: write {name}")
+            return None
+        entries = self.file[counted][()]
+        if number is None:
+            raise DataError(f"{self.path}: '{name}' has one column per {counted}: write {name}({entries[0]}) to {name}({entries[-1]})")
+        if number not in entries:
+            raise DataError(f"{self.path}: no {counted} {number}: there are {counted}s {entries[0]} to {entries[-1]}")
+        return int(np.flatnonzero(entries == number)[0])
+
+    def unit(self, name: str) -> str:
+        unit = text_of(self.file[name].attrs.get("units", ""))
+        return "" if unit in ("1", "none") else unit_text(unit)
+
+    def meaning(self, name: str, counted: str | None, number: int | None) -> str:
+        meaning = text_of(self.file[name].attrs.get("long_name", name)).removesuffix(", at the probe times")
+        return meaning + (f" ({counted} {number})" if counted else "")
+
+
+class Run(ResultFile):
+    """One run file."""
+
+    def __init__(self, path: str | pathlib.Path, file: h5py.File):
+        super().__init__(path, file)
         if "case" in file and TIME not in file:
             raise DataError(f"{path}: is a sweep file; this script reads run files")
         for name in (TIME, "phi"):
@@ -174,13 +181,15 @@ class Run:
 
     @property
     def has_ledger(self) -> bool:
-        return all(name in self.file for name in LEDGER_SYMBOLS)
+        return "energy_residual" in self.file
 
     def attribute(self, name: str, default: Any = None) -> Any:
         return text_of(self.file.attrs[name]) if name in self.file.attrs else default
 
-    def attributes(self) -> dict[str, Any]:
-        return {name: text_of(value) for name, value in self.file.attrs.items()}
+    def numbers(self) -> list[str]:
+        """Names of the quantities that have one number at each time."""
+        return [name for name, data in self.file.items() if isinstance(data, h5py.Dataset) and name != TIME
+                and self.dimensions(name) == [TIME]]
 
     def events(self) -> list[Event]:
         """What hinges did, in order; empty if nothing could happen."""
@@ -202,26 +211,19 @@ class Run:
         return self.file[name][rows]
 
     def _why_missing(self, name: str) -> str:
-        if name in LEDGER_SYMBOLS:
+        if name.startswith(LEDGER):
             return "; the case was run with ledger = .false."
         return f"; it has {', '.join(sorted(k for k, v in self.file.items() if isinstance(v, h5py.Dataset)))}"
 
     def quantity(self, text: str) -> Quantity:
-        """'omega', or 'phi(4)' of one rod."""
-        name, rod = split_name(text)
+        """'omega', or 'phi(4)' of one rod, 'hinge_angle(0)' of one hinge."""
+        name, number = split_name(text)
         if name not in self.file:
             self.rows(name)
-        data = self.file[name]
-        if data.ndim == 2 and rod is None:
-            raise DataError(f"{self.path}: '{name}' has one column per rod: write {name}(1) to {name}({self.n_rods})")
-        if data.ndim == 1 and rod is not None:
-            raise DataError(f"{self.path}: '{name}' does not belong to a rod: write {name}")
-        if rod is not None and not 1 <= rod <= self.n_rods:
-            raise DataError(f"{self.path}: no rod {rod}: the chain has rods 1 to {self.n_rods}")
-        values = data[()] if rod is None else data[:, rod - 1]
-        unit = text_of(data.attrs.get("units", UNITS.get(name, "")))
-        meaning = MEANINGS.get(name, name) + ("" if rod is None else f" of rod {rod}")
-        return Quantity(text.replace(" ", ""), values, symbol_text(name, rod), unit_text(unit), meaning)
+        counted = next(iter(self.dimensions(name)[1:]), None)
+        i = self.place(name, counted, number)
+        values = self.file[name][()] if i is None else self.file[name][:, i]
+        return Quantity(text.replace(" ", ""), values, symbol_text(name, number), self.unit(name), self.meaning(name, counted, number))
 
     def scene(self) -> dict[str, list[Group]]:
         """The namelist with every value that was used."""
@@ -260,8 +262,7 @@ class Modes(Run):
     """One file of `rodyn modes`. Shapes are complex."""
 
     def __init__(self, path: str | pathlib.Path, file: h5py.File):
-        self.path = pathlib.Path(path)
-        self.file = file
+        ResultFile.__init__(self, path, file)
         for name in ("mode", "phi_real"):
             if name not in file:
                 raise DataError(f"{path}: is no file of rodyn modes: no data set '{name}'")
@@ -294,12 +295,11 @@ class Modes(Run):
         return per_rod | {name: np.float64(values.get(name, 0.0)) for name in ("displacement_x", "displacement_y", "rotation")}
 
 
-class Sweep:
+class Sweep(ResultFile):
     """One sweep file. `axes` maps each axis to its value in every case."""
 
     def __init__(self, path: str | pathlib.Path, file: h5py.File):
-        self.path = pathlib.Path(path)
-        self.file = file
+        super().__init__(path, file)
         if "status" not in file or not isinstance(file["status"], h5py.Dataset):
             kind = "a run file; this script reads sweep files" if TIME in file else "no sweep file of Rodyn: no data set 'status'"
             raise DataError(f"{path}: is {kind}")
@@ -326,9 +326,6 @@ class Sweep:
 
     def messages(self) -> list[str]:
         return texts(self.file["message"]) if "message" in self.file else [""] * self.n_cases
-
-    def attributes(self) -> dict[str, Any]:
-        return {name: text_of(value) for name, value in self.file.attrs.items()}
 
     def axis(self, name: str) -> np.ndarray:
         if name not in self.axes:
@@ -363,15 +360,6 @@ class Sweep:
         """The slowest natural frequencies."""
         return [f"frequency({k})" for k in range(1, min(MODES_SHOWN, self.n_modes) + 1)]
 
-    def dimensions(self, name: str) -> list[str]:
-        """What the columns of a data set run over, as its dimension scales say: case first, then probe_time, rod, mode, ..."""
-        data = self.file[name]
-        found = [dimension[0].name.rpartition("/")[2] if len(dimension) else "" for dimension in data.dims]
-        if all(found):
-            return found
-        rest = ["rod"] if name in FINAL_PER_ROD else ["mode"] if name in MODE_SYMBOLS else ["probe_time", "rod"]
-        return ["case", *rest][: data.ndim]
-
     def is_probed(self, text: str) -> bool:
         """Does the quantity depend on the probe time?"""
         name = split_name(text)[0]
@@ -382,40 +370,30 @@ class Sweep:
         name, number = split_name(text)
         if name not in self.file or self.file[name].dtype.kind not in "fiu":
             raise DataError(f"{self.path}: no data set '{name}'; it has {', '.join(n for n in self.file if self._has_number(n))}")
-        data = self.file[name]
         of = self.dimensions(name)[1:]
         if "row" in of:
             raise DataError(f"{self.path}: '{name}' is a series in time, not a number of each case")
         counted = next((what for what in of if what != PROBE_TIME), None)
-        columns = np.atleast_1d(self.file[counted][()]) if counted and counted in self.file else np.arange(1, data.shape[-1] + 1)
-        if counted and number is None:
-            raise DataError(f"{self.path}: '{name}' has one column per {counted}: write {name}({columns[0]}) to {name}({columns[-1]})")
-        if not counted and number is not None:
-            raise DataError(f"{self.path}: '{name}' does not belong to a rod or a mode: write {name}")
-        if counted and number not in columns:
-            whose = "chains" if counted == "rod" else "cases"
-            raise DataError(f"{self.path}: no {counted} {number}: the {whose} have {counted}s {columns[0]} to {columns[-1]}")
-        where = tuple(self.probe(t) if what == PROBE_TIME else int(np.flatnonzero(columns == number)[0]) for what in of)
-        values = np.where(self.done, data[(slice(None), *where)].astype(float), np.nan)
-        state = name.removeprefix(FINAL)
-        words, unit = PARAMETERS.get(name, (symbol_text(state, number), UNITS.get(state, "")))
-        unit = text_of(data.attrs.get("units", unit))
-        unit = "" if unit in ("1", "none") else unit
-        meaning = MEANINGS.get(state, words) + (f" of {counted} {number}" if counted else "") + (" at the end" if state != name else "")
-        return Quantity(text.replace(" ", ""), values, words, unit_text(unit), meaning)
+        place = self.place(name, counted, number)
+        where = tuple(self.probe(t) if what == PROBE_TIME else place for what in of)
+        values = np.where(self.done, self.file[name][(slice(None), *where)].astype(float), np.nan)
+        symbol = WORDS.get(name) or symbol_text(name.removeprefix(FINAL), number)
+        meaning = WORDS.get(name) or self.meaning(name, counted, number)
+        return Quantity(text.replace(" ", ""), values, symbol, self.unit(name), meaning)
 
     def _has_number(self, name: str) -> bool:
         """Is it a quantity of each case?"""
-        return name.removeprefix(FINAL) in SYMBOLS or name in PARAMETERS
+        data = self.file[name]
+        return (isinstance(data, h5py.Dataset) and data.dtype.kind in "fiu" and not name.startswith("param_")
+                and self.dimensions(name)[:1] == ["case"] and "row" not in self.dimensions(name))
 
     def axis_label(self, name: str) -> str:
         key, index = re.fullmatch(r"(.*?)(\(\d+\))?", name).groups()
-        words, unit = PARAMETERS.get(key, (name, ""))
+        words = WORDS.get(key, name)
         if index and words.endswith("$"):
             words = f"{words[:-1]}_{{{index[1:-1]}}}$"
-        data = self.file[f"param_{name}"]
-        unit = text_of(data.attrs.get("units", unit))
-        return f"{words} [{unit_text(unit)}]" if unit not in ("", "1", "none") else words
+        unit = self.unit(f"param_{name}")
+        return f"{words} [{unit}]" if unit else words
 
     def chosen(self, where: Mapping[str, str | float]) -> np.ndarray:
         """Which cases have these values on these axes."""

@@ -68,22 +68,41 @@ def write_sweep(path: pathlib.Path, axes: dict[str, list], phi: np.ndarray, fail
         file["probe_time"].attrs["units"] = np.bytes_("s")
         for factor, name in enumerate(("phi", "alpha", "beta", "phi_rate", "alpha_rate", "beta_rate")):
             file[name] = np.where(bad[:, None, None], np.nan, phi * 10.0**-factor)
-            file[name].attrs["units"] = np.bytes_("rad s-1" if name.endswith("rate") else "rad")
+            describe(file[name], "rad s-1" if name.endswith("rate") else "rad", f"{name} of a rod, at the probe times")
         for factor, name in enumerate(("velocity_x", "velocity_y", "omega", "displacement_x", "displacement_y", "rotation")):
             file[name] = np.where(bad[:, None], np.nan, phi[:, :, 0] + factor)
         file["final_phi"] = phi[:, -1] + 100.0
+        describe(file["final_phi"], "rad", "phi of a rod, at the end of the case")
         file["final_rotation"] = phi[:, -1, 0] + 100.0
         for key, values in axes.items():
             column = np.array(values)
             if column.dtype.kind == "U":
                 column = column.astype(text_type) if text_type != "vlen" else column.astype(h5py.string_dtype())
             file[f"param_{key}"] = column
+            describe(file[f"param_{key}"], AXIS_UNITS.get(key, "1"), f"value of {key}")
         file["status"] = np.where(bad, "failed", "done").astype("S8")
         file["message"] = np.where(bad, "t = 0.3 s: step size too small", "").astype("S64")
         file["t_reached"] = np.where(bad, 0.3, probe_times[-1])
         file["n_rhs"] = np.arange(n_cases) * 100
         file["wall_seconds"] = np.full(n_cases, 0.01)
+        for scale in ("case", "probe_time", "rod"):
+            file[scale].make_scale(scale)
+        for name, data in file.items():
+            for i, scale in enumerate(() if data.is_scale else scales_of(name, data.ndim)):
+                data.dims[i].attach_scale(file[scale])
     return path
+
+
+AXIS_UNITS = {"chain.hinge_stiffness(0)": "N m rad-1", "solver.fixed_step": "s"}
+
+
+def describe(data: h5py.Dataset, units: str, long_name: str) -> None:
+    data.attrs["units"], data.attrs["long_name"] = np.bytes_(units), np.bytes_(long_name)
+
+
+def scales_of(name: str, rank: int) -> list[str]:
+    """What a data set of a sweep runs over."""
+    return (["case", "rod"] if name.startswith("final_") else ["case", "probe_time", "rod"])[:rank]
 
 
 RATIOS = [2.0, 4.0, 8.0, 16.0, 32.0]
@@ -153,4 +172,11 @@ def write_large_run(path: pathlib.Path, like: pathlib.Path, megabytes: int) -> i
             file[name] = values
             for key in ("units", "long_name"):
                 file[name].attrs[key] = data.attrs[key]
+        for name, data in sets.items():
+            if data.is_scale:
+                file[name].make_scale(name)
+        for name, data in sets.items():
+            for i, dimension in enumerate(data.dims):
+                for scale in dimension.values():
+                    file[name].dims[i].attach_scale(file[scale.name])
     return peak

@@ -227,7 +227,7 @@ def test_scripts_print_the_paths_they_wrote(runs, sweeps, tmp_path, name, kind, 
 
 def test_wrong_names_are_answered_in_words(runs, sweeps):
     for name, file, options, words in [
-        ("histories", runs["n4"], ["-q", "phi(5)"], "no rod 5: the chain has rods 1 to 4"),
+        ("histories", runs["n4"], ["-q", "phi(5)"], "no rod 5: there are rods 1 to 4"),
         ("histories", runs["n4"], ["-q", "phi"], "write phi(1) to phi(4)"),
         ("histories", runs["n4"], ["-q", "omega(1)"], "does not belong to a rod"),
         ("histories", runs["n4"], ["-q", "speed"], "no data set 'speed'; it has alpha, "),

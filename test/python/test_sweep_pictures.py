@@ -130,7 +130,7 @@ def test_a_run_can_be_the_reference(runs, sweeps, tmp_path):
 
 def test_what_a_sweep_lacks_is_said(runs, sweeps, tmp_path):
     for arguments, words in [
-        ((["phi(9)"],), "no rod 9: the chains have rods 1 to 4"),
+        ((["phi(9)"],), "no rod 9: there are rods 1 to 4"),
         ((["phi"],), r"write phi\(1\) to phi\(4\)"),
         ((["energy"],), "no data set 'energy'"),
         ((["phi(1)"], "length"), "no axis 'length'; it has mass_ratio, model.inertia"),
@@ -160,7 +160,7 @@ def test_texts_of_any_kind_are_read(tmp_path):
 
 def test_states_at_the_end_are_quantities_too(sweeps, tmp_path):
     figure = sweep_lines.plot(sweeps["inertia"], tmp_path / "x.png", ["final_phi(2)", "final_rotation"])
-    assert figure.axes[0].get_title(loc="left") == "chord angle of rod 2 at the end"
+    assert figure.axes[0].get_title(loc="left") == "phi of a rod, at the end of the case (rod 2)"
     assert np.allclose(labelled(figure.axes[0])["distributed"][:, 1], 100 - 2 / np.array(result_files.RATIOS))
     assert np.allclose(labelled(figure.axes[1])["lumped"][:, 1], 100 - 1.1 / np.array(result_files.RATIOS))
 
@@ -197,14 +197,14 @@ def test_columns_are_those_that_the_file_says(frequencies, tmp_path):
                   file["omega"][:, 1], file["final_phi"][:, 0]]
     for ours, right in zip(drawn, wanted, strict=True):
         assert np.array_equal(ours, right)
-    assert figure.axes[1].get_title(loc="left") == "natural frequency of mode 3"
+    assert figure.axes[1].get_title(loc="left") == "natural frequency at the initial state (mode 3)"
     assert figure.axes[1].get_ylabel().endswith("[rad/s]")
     assert "t = 0.05 s" in figure.get_suptitle()
     figure = convergence.plot(frequencies / "both", tmp_path / "x.png", ["frequency(2)"], "chain.hinge_stiffness(0)")
     assert "t = " not in figure.get_suptitle()  # frequencies have no probe time
     with pytest.raises(DataError, match=r"write frequency\(1\) to frequency\(3\)"):
         sweep_lines.plot(frequencies / "both", tmp_path / "x.png", ["frequency"])
-    with pytest.raises(DataError, match="no mode 4: the cases have modes 1 to 3"):
+    with pytest.raises(DataError, match="no mode 4: there are modes 1 to 3"):
         sweep_lines.plot(frequencies / "both", tmp_path / "x.png", ["frequency(4)"])
     with pytest.raises(DataError, match="'series_omega' is a series in time"):
         sweep_lines.plot(frequencies / "both", tmp_path / "x.png", ["series_omega"])
