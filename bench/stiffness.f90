@@ -202,16 +202,16 @@ contains
          list = list//trim(methods(i))//','
       end do
       call file%create(path, error)
-      if (.not. allocated(error)) call file%put_attribute('/', 'methods', list(:len(list) - 1), error)
-      if (.not. allocated(error)) call file%put_attribute('/', 'compiler_options', compiler_options(), error)
+      if (allocated(error)) error stop error%message
+      call file%put_attribute('/', 'methods', list(:len(list) - 1))
+      call file%put_attribute('/', 'compiler_options', compiler_options())
       do i = 1, size(names)
-         if (allocated(error)) exit
          do j = 1, size(records)
             column(j) = records(j)%values(i)
          end do
-         call file%write(trim(names(i)), column, 0, error)
+         call file%write(trim(names(i)), column, 0)
       end do
-      if (.not. allocated(error)) call file%close(error)
+      call file%close(error)
       if (allocated(error)) error stop error%message
    end subroutine write_file
 

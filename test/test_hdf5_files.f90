@@ -28,7 +28,8 @@ contains
          new_test('a missing file is told with call, path and reason', test_missing_file), &
          new_test('a file that is not HDF5 is told', test_not_hdf5), &
          new_test('a flipped bit is noticed by the checksum', test_flipped_bit), &
-         new_test('a wrong rank and a missing object are told', test_wrong_object)]
+         new_test('a wrong rank and a missing object are told', test_wrong_object), &
+         new_test('after a failure nothing more is written, and the first failure is told', test_first_failure)]
    end subroutine collect_hdf5_files
 
    subroutine test_attributes(error)
@@ -44,20 +45,13 @@ contains
       work: block
          call file%create(path, error)
          if (allocated(error)) exit work
-         call file%create_group('solver', error)
-         if (allocated(error)) exit work
-         call file%put_attribute('/', 'text', 'Стержни, 5 µm'//new_line('a')//'  two  ', error)
-         if (allocated(error)) exit work
-         call file%put_attribute('/', 'empty', '', error)
-         if (allocated(error)) exit work
-         call file%put_attribute('solver', 'number', 0.1_wp, error)
-         if (allocated(error)) exit work
-         call file%put_attribute('solver', 'count', -7, error)
-         if (allocated(error)) exit work
-         call file%put_attribute('solver', 'long_count', 5000000000_i8, error)
-         if (allocated(error)) exit work
-         call file%put_attribute('solver', 'flag', .true., error)
-         if (allocated(error)) exit work
+         call file%create_group('solver')
+         call file%put_attribute('/', 'text', 'Стержни, 5 µm'//new_line('a')//'  two  ')
+         call file%put_attribute('/', 'empty', '')
+         call file%put_attribute('solver', 'number', 0.1_wp)
+         call file%put_attribute('solver', 'count', -7)
+         call file%put_attribute('solver', 'long_count', 5000000000_i8)
+         call file%put_attribute('solver', 'flag', .true.)
          call file%close(error)
          if (allocated(error)) exit work
 
@@ -104,8 +98,7 @@ contains
       work: block
          call file%create(path, error)
          if (allocated(error)) exit work
-         call file%put_attribute('/', 'input', text, error)
-         if (allocated(error)) exit work
+         call file%put_attribute('/', 'input', text)
          call file%close(error)
          if (allocated(error)) exit work
          call file%open(path, error)
@@ -126,9 +119,9 @@ contains
       work: block
          call file%create(path, error)
          if (allocated(error)) exit work
-         call file%put_attribute('/', 'status', 'running', error)
-         if (allocated(error)) exit work
-         call file%put_attribute('/', 'status', 'done', error)
+         call file%put_attribute('/', 'status', 'running')
+         call file%put_attribute('/', 'status', 'done')
+         call file%tell(error)
          if (allocated(error)) exit work
          call file%get_attribute('/', 'status', text, error)
          if (allocated(error)) exit work
@@ -152,22 +145,15 @@ contains
       work: block
          call file%create(path, error)
          if (allocated(error)) exit work
-         call file%create_series('time', [integer ::], 3, 4, error)
-         if (allocated(error)) exit work
-         call file%create_series('phi', [3], 3, 0, error)
-         if (allocated(error)) exit work
-         call file%make_scale('time', error)
-         if (allocated(error)) exit work
-         call file%attach_scale('phi', 2, 'time', error)
-         if (allocated(error)) exit work
+         call file%create_series('time', [integer ::], 3, 4)
+         call file%create_series('phi', [3], 3, 0)
+         call file%make_scale('time')
+         call file%attach_scale('phi', 2, 'time')
          do k = 1, size(first)
-            call file%append('time', times(first(k):last(k)), error)
-            if (allocated(error)) exit work
-            call file%append('phi', phi(:, first(k):last(k)), error)
-            if (allocated(error)) exit work
+            call file%append('time', times(first(k):last(k)))
+            call file%append('phi', phi(:, first(k):last(k)))
          end do
-         call file%append('time', [real(wp) ::], error)
-         if (allocated(error)) exit work
+         call file%append('time', [real(wp) ::])
          call file%close(error)
          if (allocated(error)) exit work
          call file%open(path, error)
@@ -201,14 +187,10 @@ contains
       work: block
          call file%create(path, error)
          if (allocated(error)) exit work
-         call file%write('rod', [1, 2, 3], 4, error)
-         if (allocated(error)) exit work
-         call file%write('one', values, 4, error)
-         if (allocated(error)) exit work
-         call file%write('two', reshape(values, [4, 6]), 4, error)
-         if (allocated(error)) exit work
-         call file%write('three', reshape(values, [2, 3, 4]), 4, error)
-         if (allocated(error)) exit work
+         call file%write('rod', [1, 2, 3], 4)
+         call file%write('one', values, 4)
+         call file%write('two', reshape(values, [4, 6]), 4)
+         call file%write('three', reshape(values, [2, 3, 4]), 4)
          call file%close(error)
          if (allocated(error)) exit work
          call file%open(path, error)
@@ -244,12 +226,9 @@ contains
       work: block
          call file%create(path, error)
          if (allocated(error)) exit work
-         call file%write('rod', [1], 0, error)
-         if (allocated(error)) exit work
-         call file%create_group('cases', error)
-         if (allocated(error)) exit work
-         call file%write('cases/b', [1], 0, error)
-         if (allocated(error)) exit work
+         call file%write('rod', [1], 0)
+         call file%create_group('cases')
+         call file%write('cases/b', [1], 0)
          call file%members('/', names, error)
          if (allocated(error)) exit work
          call check(error, size(names), 2, 'members of the root')
@@ -274,18 +253,12 @@ contains
          do k = 1, 2
             call file%create(path, error)
             if (allocated(error)) exit work
-            call file%create_group('solver', error)
-            if (allocated(error)) exit work
-            call file%write('rod', [1, 2, 3], 4, error)
-            if (allocated(error)) exit work
-            call file%make_scale('rod', error)
-            if (allocated(error)) exit work
-            call file%create_series('phi', [3], 5, 4, error)
-            if (allocated(error)) exit work
-            call file%attach_scale('phi', 1, 'rod', error)
-            if (allocated(error)) exit work
-            call file%append('phi', reshape([1.0_wp, 2.0_wp, 3.0_wp], [3, 1]), error)
-            if (allocated(error)) exit work
+            call file%create_group('solver')
+            call file%write('rod', [1, 2, 3], 4)
+            call file%make_scale('rod')
+            call file%create_series('phi', [3], 5, 4)
+            call file%attach_scale('phi', 1, 'rod')
+            call file%append('phi', reshape([1.0_wp, 2.0_wp, 3.0_wp], [3, 1]))
             call file%close(error)
             if (allocated(error)) exit work
             if (k == 1) first = file_bytes(path)
@@ -352,8 +325,7 @@ contains
       work: block
          call file%create(path, error)
          if (allocated(error)) exit work
-         call file%write('values', [1.5_wp, 2.5_wp, 3.5_wp], 0, error)
-         if (allocated(error)) exit work
+         call file%write('values', [1.5_wp, 2.5_wp, 3.5_wp], 0)
          call file%close(error)
          if (allocated(error)) exit work
          bytes = file_bytes(path)
@@ -384,8 +356,7 @@ contains
       work: block
          call file%create(path, error)
          if (allocated(error)) exit work
-         call file%write('rod', [1, 2], 0, error)
-         if (allocated(error)) exit work
+         call file%write('rod', [1, 2], 0)
          call file%read('rod', values, refusal)
          call check(error, allocated(refusal), 'rank 1 was read as rank 2')
          if (allocated(error)) exit work
@@ -401,6 +372,48 @@ contains
       end block work
       call clean(path)
    end subroutine test_wrong_object
+
+   subroutine test_first_failure(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable :: told
+      type(hdf5_file) :: file
+      character(len=:), allocatable :: path
+
+      path = scratch_path('first.h5')
+      work: block
+         call file%create(path, error)
+         if (allocated(error)) exit work
+         call file%write('rod', [1, 2], 0)
+         call file%make_scale('none')
+         call file%append('neither', [1.0_wp])
+         call file%write('late', [1, 2], 0)
+         call file%put_attribute('/', 'late', 'text')
+         call check(error, file%exists('rod') .and. .not. (file%exists('late') .or. file%has_attribute('/', 'late')), 'contents')
+         if (allocated(error)) exit work
+         call file%tell(told)
+         call expect("h5dopen_f failed on 'none'")
+         if (.not. allocated(error)) call file%flush(told)
+         call expect("h5dopen_f failed on 'none'")
+         if (.not. allocated(error)) call file%close(told)
+         call expect("h5dopen_f failed on 'none'")
+         call clean(path)
+         if (.not. allocated(error)) call file%create(path, error)
+         if (allocated(error)) exit work
+         call file%write('rod', [1, 2], 0)
+         call file%close(error)
+      end block work
+      call clean(path)
+
+   contains
+
+      subroutine expect(words)
+         character(len=*), intent(in) :: words
+         if (allocated(error)) return
+         call check(error, allocated(told), 'not told')
+         if (.not. allocated(error)) call check(error, index(told%message, words) > 0, told%message)
+      end subroutine expect
+
+   end subroutine test_first_failure
 
    function file_bytes(path) result(bytes)
       character(len=*), intent(in) :: path

@@ -3,7 +3,8 @@
 !> Objects are addressed by name ('/' is the root, 'solver' a group, 'phi' a data set); no handle but the file's
 !> own lives longer than a call. Shapes are Fortran's: `(rod, time)` here is `(time, rod)` in C and Python.
 !> Files are readable by HDF5 1.8 and later and carry no time stamps: equal contents are equal bytes.
-!> A failed library call becomes a message with the call, the object, the path and the library's own reason.
+!> A failed library call becomes a message with the call, the object, the path and the library's own reason. A failure in writing
+!> is kept: whatever is to be written after it is not, and `tell`, `flush` and `close` tell of it.
 module rodyn_hdf5_files
    use, intrinsic :: iso_c_binding, only: c_associated, c_bool, c_char, c_f_pointer, c_funloc, c_funptr, c_int, c_int64_t, c_loc, &
       c_null_char, c_ptr, c_size_t
@@ -41,12 +42,14 @@ module rodyn_hdf5_files
    type :: hdf5_file
       character(len=:), allocatable :: path
       integer(hid_t), private :: id = -1_hid_t
+      type(error_type), allocatable, private :: error !! first failure in writing
    contains
       procedure :: create
       procedure :: open
       procedure :: is_open
       procedure :: flush => flush_file
       procedure :: close => close_file
+      procedure :: tell
       procedure :: create_group
       procedure :: create_series
       procedure :: create_texts
@@ -62,6 +65,8 @@ module rodyn_hdf5_files
       generic :: read => read_integer_1, read_real_1, read_real_2, read_real_3
       generic :: get_attribute => get_text, get_real, get_int32, get_int64, get_logical
       procedure, private :: failed
+      procedure, private :: note
+      procedure, private :: fails
       procedure, private :: append_1, append_2, append_3, append_int64, append_texts, append_block
       procedure, private :: write_integer_1, write_real_1, write_real_2, write_real_3, write_whole
       procedure, private :: put_text, put_real, put_int32, put_int64, put_logical, put_number
@@ -132,6 +137,7 @@ contains
       integer(hid_t) :: access_list, creation_list
       integer :: status
 
+      if (allocated(self%error)) deallocate (self%error)
       call start_library()
       self%path = path
       call new_access_list(access_list)
@@ -168,12 +174,15 @@ contains
 
    !> Hand everything written so far to the operating system.
    subroutine flush_file(self, error)
-      class(hdf5_file), intent(in) :: self
+      class(hdf5_file), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
       integer :: status
 
-      call h5fflush_f(self%id, h5f_scope_local_f, status)
-      if (self%failed(status, 'h5fflush_f', '/', error)) return
+      if (.not. allocated(self%error)) then
+         call h5fflush_f(self%id, h5f_scope_local_f, status)
+         call self%note(status, 'h5fflush_f', '/')
+      end if
+      call self%tell(error)
    end subroutine flush_file
 
    !> Close the file and whatever of it is still open; nothing happens if it is closed already.
@@ -185,8 +194,16 @@ contains
       if (.not. self%is_open()) return
       call h5fclose_f(self%id, status)
       self%id = -1_hid_t
-      if (self%failed(status, 'h5fclose_f', '/', error)) return
+      call self%note(status, 'h5fclose_f', '/')
+      call move_alloc(self%error, error)
    end subroutine close_file
+
+   !> The first failure in writing, if there was one.
+   subroutine tell(self, error)
+      class(hdf5_file), intent(in) :: self
+      type(error_type), allocatable, intent(out) :: error
+      if (allocated(self%error)) error = self%error
+   end subroutine tell
 
    impure elemental subroutine finalize(self)
       type(hdf5_file), intent(inout) :: self
@@ -195,115 +212,108 @@ contains
    end subroutine finalize
 
    !> Make a group.
-   subroutine create_group(self, name, error)
-      class(hdf5_file), intent(in) :: self
+   subroutine create_group(self, name)
+      class(hdf5_file), intent(inout) :: self
       character(len=*), intent(in) :: name
-      type(error_type), allocatable, intent(out) :: error
       integer(hid_t) :: group, creation_list
       integer :: status
 
+      if (allocated(self%error)) return
       call h5pcreate_f(h5p_group_create_f, creation_list, status)
       call h5pset_obj_track_times_f(creation_list, .false., status)
       call h5gcreate_f(self%id, name, group, status, gcpl_id=creation_list)
-      if (.not. self%failed(status, 'h5gcreate_f', name, error)) call h5gclose_f(group, status)
+      if (.not. self%fails(status, 'h5gcreate_f', name)) call h5gclose_f(group, status)
       call h5pclose_f(creation_list, status)
    end subroutine create_group
 
    !> Make an empty data set of numbers that grows along its last dimension, time.
-   subroutine create_series(self, name, row_shape, chunk_rows, compression, error, whole)
-      class(hdf5_file), intent(in) :: self
+   subroutine create_series(self, name, row_shape, chunk_rows, compression, whole)
+      class(hdf5_file), intent(inout) :: self
       character(len=*), intent(in) :: name
       integer, intent(in) :: row_shape(:) !! shape of one row; empty: one number per time
       integer, intent(in) :: chunk_rows   !! rows per chunk, >= 1; blocks of as many are written fastest
       integer, intent(in) :: compression  !! gzip level, 0..9
-      type(error_type), allocatable, intent(out) :: error
       logical, intent(in), optional :: whole !! integers of 64 bits
       integer(hid_t) :: file_type
 
       file_type = h5t_ieee_f64le
       if (present(whole)) file_type = merge(h5t_std_i64le, h5t_ieee_f64le, whole)
-      call new_series(self, name, file_type, row_shape, chunk_rows, compression, error)
+      call new_series(self, name, file_type, row_shape, chunk_rows, compression)
    end subroutine create_series
 
    !> Make an empty series of texts, one per time. They have one length in the file, or Octave could not read them, nor
    !> filters reach them; and they are called ASCII, whatever they are, as Octave wants it. The attribute is xarray's.
-   subroutine create_texts(self, name, length, chunk_rows, compression, error)
-      class(hdf5_file), intent(in) :: self
+   subroutine create_texts(self, name, length, chunk_rows, compression)
+      class(hdf5_file), intent(inout) :: self
       character(len=*), intent(in) :: name
       integer, intent(in) :: length       !! of the longest [bytes]
       integer, intent(in) :: chunk_rows, compression !! as in `create_series`
-      type(error_type), allocatable, intent(out) :: error
       integer(hid_t) :: file_type
       integer :: status
 
       file_type = text_type(length, h5t_str_nullpad_f, h5t_cset_ascii_f)
-      call new_series(self, name, file_type, [integer ::], chunk_rows, compression, error)
+      call new_series(self, name, file_type, [integer ::], chunk_rows, compression)
       call h5tclose_f(file_type, status)
-      if (.not. allocated(error)) call self%put_attribute(name, '_Encoding', 'utf-8', error)
+      call self%put_attribute(name, '_Encoding', 'utf-8')
    end subroutine create_texts
 
-   subroutine new_series(self, name, file_type, row_shape, chunk_rows, compression, error)
-      class(hdf5_file), intent(in) :: self
+   subroutine new_series(self, name, file_type, row_shape, chunk_rows, compression)
+      class(hdf5_file), intent(inout) :: self
       character(len=*), intent(in) :: name
       integer(hid_t), intent(in) :: file_type
       integer, intent(in) :: row_shape(:), chunk_rows, compression
-      type(error_type), allocatable, intent(out) :: error
       integer(hid_t) :: set
       integer :: status
 
+      if (allocated(self%error)) return
       call new_dataset(self, name, file_type, int([row_shape, 0], hsize_t), int([row_shape, chunk_rows], hsize_t), .true., &
-                       compression, set, error)
-      if (allocated(error)) return
+                       compression, set)
+      if (allocated(self%error)) return
       call h5dclose_f(set, status)
-      if (self%failed(status, 'h5dclose_f', name, error)) return
+      call self%note(status, 'h5dclose_f', name)
    end subroutine new_series
 
    !> Append numbers, one per time, to a series.
-   subroutine append_1(self, name, values, error)
-      class(hdf5_file), intent(in) :: self
+   subroutine append_1(self, name, values)
+      class(hdf5_file), intent(inout) :: self
       character(len=*), intent(in) :: name
       real(wp), intent(in), contiguous, target :: values(:) !! (time)
-      type(error_type), allocatable, intent(out) :: error
       if (size(values) == 0) return
-      call self%append_block(name, h5t_native_double, c_loc(values), int(shape(values), hsize_t), error)
+      call self%append_block(name, h5t_native_double, c_loc(values), int(shape(values), hsize_t))
    end subroutine append_1
 
    !> Append rows to a series.
-   subroutine append_2(self, name, values, error)
-      class(hdf5_file), intent(in) :: self
+   subroutine append_2(self, name, values)
+      class(hdf5_file), intent(inout) :: self
       character(len=*), intent(in) :: name
       real(wp), intent(in), contiguous, target :: values(:, :) !! (rod, time)
-      type(error_type), allocatable, intent(out) :: error
       if (size(values) == 0) return
-      call self%append_block(name, h5t_native_double, c_loc(values), int(shape(values), hsize_t), error)
+      call self%append_block(name, h5t_native_double, c_loc(values), int(shape(values), hsize_t))
    end subroutine append_2
 
    !> Append tables to a series.
-   subroutine append_3(self, name, values, error)
-      class(hdf5_file), intent(in) :: self
+   subroutine append_3(self, name, values)
+      class(hdf5_file), intent(inout) :: self
       character(len=*), intent(in) :: name
       real(wp), intent(in), contiguous, target :: values(:, :, :)
-      type(error_type), allocatable, intent(out) :: error
       if (size(values) == 0) return
-      call self%append_block(name, h5t_native_double, c_loc(values), int(shape(values), hsize_t), error)
+      call self%append_block(name, h5t_native_double, c_loc(values), int(shape(values), hsize_t))
    end subroutine append_3
 
    !> Append whole numbers to a series of integers.
-   subroutine append_int64(self, name, values, error)
-      class(hdf5_file), intent(in) :: self
+   subroutine append_int64(self, name, values)
+      class(hdf5_file), intent(inout) :: self
       character(len=*), intent(in) :: name
       integer(int64), intent(in), contiguous, target :: values(:)
-      type(error_type), allocatable, intent(out) :: error
       if (size(values) == 0) return
-      call self%append_block(name, h5kind_to_type(int64, h5_integer_kind), c_loc(values), int(shape(values), hsize_t), error)
+      call self%append_block(name, h5kind_to_type(int64, h5_integer_kind), c_loc(values), int(shape(values), hsize_t))
    end subroutine append_int64
 
    !> Append texts to a series of texts.
-   subroutine append_texts(self, name, values, error)
-      class(hdf5_file), intent(in) :: self
+   subroutine append_texts(self, name, values)
+      class(hdf5_file), intent(inout) :: self
       character(len=*), intent(in) :: name
       character(len=*), intent(in) :: values(:) !! trailing blanks do not count
-      type(error_type), allocatable, intent(out) :: error
       character(len=max(1, len(values))), allocatable, target :: texts(:)
       integer(hid_t) :: memory_type
       integer :: status
@@ -312,7 +322,7 @@ contains
       allocate (texts(size(values)))
       texts(:) = values
       memory_type = text_type(len(texts), h5t_str_spacepad_f, h5t_cset_ascii_f)
-      call self%append_block(name, memory_type, c_loc(texts), [size(values, kind=hsize_t)], error)
+      call self%append_block(name, memory_type, c_loc(texts), [size(values, kind=hsize_t)])
       call h5tclose_f(memory_type, status)
    end subroutine append_texts
 
@@ -330,118 +340,109 @@ contains
    end function text_type
 
    !> Extend a data set along its last dimension and fill the new part.
-   subroutine append_block(self, name, memory_type, values, counts, error)
-      class(hdf5_file), intent(in) :: self
+   subroutine append_block(self, name, memory_type, values, counts)
+      class(hdf5_file), intent(inout) :: self
       character(len=*), intent(in) :: name
       integer(hid_t), intent(in) :: memory_type
       type(c_ptr), intent(in) :: values         !! contiguous, of that type
       integer(hsize_t), intent(in) :: counts(:) !! shape of values
-      type(error_type), allocatable, intent(out) :: error
       integer(hid_t) :: set, file_space, memory_space
       integer(hsize_t) :: extent(max_rank), most(max_rank), start(size(counts))
       integer :: rank, status
 
+      if (allocated(self%error)) return
       rank = size(counts)
       call h5dopen_f(self%id, name, set, status)
-      if (self%failed(status, 'h5dopen_f', name, error)) return
+      if (self%fails(status, 'h5dopen_f', name)) return
       work: block
          call h5dget_space_f(set, file_space, status)
-         if (self%failed(status, 'h5dget_space_f', name, error)) exit work
+         if (self%fails(status, 'h5dget_space_f', name)) exit work
          call h5sget_simple_extent_dims_f(file_space, extent, most, status)
          call h5sclose_f(file_space, status)
          start = 0_hsize_t
          start(rank) = extent(rank)
          call h5dset_extent_f(set, [counts(:rank - 1), start(rank) + counts(rank)], status)
-         if (self%failed(status, 'h5dset_extent_f', name, error)) exit work
+         if (self%fails(status, 'h5dset_extent_f', name)) exit work
          call h5dget_space_f(set, file_space, status)
-         if (self%failed(status, 'h5dget_space_f', name, error)) exit work
+         if (self%fails(status, 'h5dget_space_f', name)) exit work
          call h5sselect_hyperslab_f(file_space, h5s_select_set_f, start, counts, status)
          call h5screate_simple_f(rank, counts, memory_space, status)
          call h5dwrite_f(set, memory_type, values, status, memory_space, file_space)
-         if (self%failed(status, 'h5dwrite_f', name, error)) continue
+         call self%note(status, 'h5dwrite_f', name)
          call h5sclose_f(memory_space, status)
          call h5sclose_f(file_space, status)
       end block work
       call h5dclose_f(set, status)
-      if (.not. allocated(error)) then
-         if (self%failed(status, 'h5dclose_f', name, error)) return
-      end if
+      call self%note(status, 'h5dclose_f', name)
    end subroutine append_block
 
    !> Write a whole data set of fixed shape, as one chunk with checksum.
-   subroutine write_integer_1(self, name, values, compression, error)
-      class(hdf5_file), intent(in) :: self
+   subroutine write_integer_1(self, name, values, compression)
+      class(hdf5_file), intent(inout) :: self
       character(len=*), intent(in) :: name
       integer, intent(in), contiguous, target :: values(:)
       integer, intent(in) :: compression !! gzip level, 0..9
-      type(error_type), allocatable, intent(out) :: error
       call self%write_whole(name, h5t_std_i32le, h5kind_to_type(kind(values), h5_integer_kind), c_loc(values), &
-         int(shape(values), hsize_t), compression, error)
+         int(shape(values), hsize_t), compression)
    end subroutine write_integer_1
 
-   subroutine write_real_1(self, name, values, compression, error)
-      class(hdf5_file), intent(in) :: self
+   subroutine write_real_1(self, name, values, compression)
+      class(hdf5_file), intent(inout) :: self
       character(len=*), intent(in) :: name
       real(wp), intent(in), contiguous, target :: values(:)
       integer, intent(in) :: compression !! gzip level, 0..9
-      type(error_type), allocatable, intent(out) :: error
       call self%write_whole(name, h5t_ieee_f64le, h5t_native_double, c_loc(values), int(shape(values), hsize_t), &
-         compression, error)
+         compression)
    end subroutine write_real_1
 
-   subroutine write_real_2(self, name, values, compression, error)
-      class(hdf5_file), intent(in) :: self
+   subroutine write_real_2(self, name, values, compression)
+      class(hdf5_file), intent(inout) :: self
       character(len=*), intent(in) :: name
       real(wp), intent(in), contiguous, target :: values(:, :)
       integer, intent(in) :: compression !! gzip level, 0..9
-      type(error_type), allocatable, intent(out) :: error
       call self%write_whole(name, h5t_ieee_f64le, h5t_native_double, c_loc(values), int(shape(values), hsize_t), &
-         compression, error)
+         compression)
    end subroutine write_real_2
 
-   subroutine write_real_3(self, name, values, compression, error)
-      class(hdf5_file), intent(in) :: self
+   subroutine write_real_3(self, name, values, compression)
+      class(hdf5_file), intent(inout) :: self
       character(len=*), intent(in) :: name
       real(wp), intent(in), contiguous, target :: values(:, :, :)
       integer, intent(in) :: compression !! gzip level, 0..9
-      type(error_type), allocatable, intent(out) :: error
       call self%write_whole(name, h5t_ieee_f64le, h5t_native_double, c_loc(values), int(shape(values), hsize_t), &
-         compression, error)
+         compression)
    end subroutine write_real_3
 
-   subroutine write_whole(self, name, file_type, memory_type, values, extent, compression, error)
-      class(hdf5_file), intent(in) :: self
+   subroutine write_whole(self, name, file_type, memory_type, values, extent, compression)
+      class(hdf5_file), intent(inout) :: self
       character(len=*), intent(in) :: name
       integer(hid_t), intent(in) :: file_type, memory_type
       type(c_ptr), intent(in) :: values
       integer(hsize_t), intent(in) :: extent(:)
       integer, intent(in) :: compression
-      type(error_type), allocatable, intent(out) :: error
       integer(hid_t) :: set
       integer :: status
 
-      call new_dataset(self, name, file_type, extent, max(extent, 1_hsize_t), .false., compression, set, error)
-      if (allocated(error)) return
+      if (allocated(self%error)) return
+      call new_dataset(self, name, file_type, extent, max(extent, 1_hsize_t), .false., compression, set)
+      if (allocated(self%error)) return
       if (product(extent) > 0_hsize_t) then
          call h5dwrite_f(set, memory_type, values, status)
-         if (self%failed(status, 'h5dwrite_f', name, error)) continue
+         call self%note(status, 'h5dwrite_f', name)
       end if
       call h5dclose_f(set, status)
-      if (.not. allocated(error)) then
-         if (self%failed(status, 'h5dclose_f', name, error)) return
-      end if
+      call self%note(status, 'h5dclose_f', name)
    end subroutine write_whole
 
    !> Make a data set with the filters of every data set: shuffle and gzip (level > 0), then a checksum.
-   subroutine new_dataset(self, name, file_type, extent, chunk, growing, compression, set, error)
-      class(hdf5_file), intent(in) :: self
+   subroutine new_dataset(self, name, file_type, extent, chunk, growing, compression, set)
+      class(hdf5_file), intent(inout) :: self
       character(len=*), intent(in) :: name
       integer(hid_t), intent(in) :: file_type
       integer(hsize_t), intent(in) :: extent(:), chunk(:)
       logical, intent(in) :: growing     !! the last dimension has no bound
       integer, intent(in) :: compression !! gzip level, 0..9
       integer(hid_t), intent(out) :: set !! open; the caller closes it
-      type(error_type), allocatable, intent(out) :: error
       integer(hsize_t) :: most(size(extent))
       integer(hid_t) :: space, creation_list
       integer :: status
@@ -450,62 +451,66 @@ contains
       most = extent
       if (growing) most(size(most)) = h5s_unlimited_f
       call h5screate_simple_f(size(extent), extent, space, status, most)
-      if (self%failed(status, 'h5screate_simple_f', name, error)) return
+      if (self%fails(status, 'h5screate_simple_f', name)) return
       call h5pcreate_f(h5p_dataset_create_f, creation_list, status)
       work: block
          call h5pset_obj_track_times_f(creation_list, .false., status)
          call h5pset_chunk_f(creation_list, size(chunk), chunk, status)
-         if (self%failed(status, 'h5pset_chunk_f', name, error)) exit work
+         if (self%fails(status, 'h5pset_chunk_f', name)) exit work
          if (compression > 0) then
             call h5pset_shuffle_f(creation_list, status)
-            if (self%failed(status, 'h5pset_shuffle_f', name, error)) exit work
+            if (self%fails(status, 'h5pset_shuffle_f', name)) exit work
             call h5pset_deflate_f(creation_list, compression, status)
-            if (self%failed(status, 'h5pset_deflate_f', name, error)) exit work
+            if (self%fails(status, 'h5pset_deflate_f', name)) exit work
          end if
          call h5pset_fletcher32_f(creation_list, status)
-         if (self%failed(status, 'h5pset_fletcher32_f', name, error)) exit work
+         if (self%fails(status, 'h5pset_fletcher32_f', name)) exit work
          call h5dcreate_f(self%id, name, file_type, space, set, status, dcpl_id=creation_list)
-         if (self%failed(status, 'h5dcreate_f', name, error)) exit work
+         if (self%fails(status, 'h5dcreate_f', name)) exit work
       end block work
       call h5pclose_f(creation_list, status)
       call h5sclose_f(space, status)
    end subroutine new_dataset
 
    !> Turn a data set into a dimension scale, the coordinate of a dimension of the same name.
-   subroutine make_scale(self, name, error)
-      class(hdf5_file), intent(in) :: self
+   subroutine make_scale(self, name)
+      class(hdf5_file), intent(inout) :: self
       character(len=*), intent(in) :: name
-      type(error_type), allocatable, intent(out) :: error
       integer(hid_t) :: set
       integer :: status
 
+      if (allocated(self%error)) return
       call h5dopen_f(self%id, name, set, status)
-      if (self%failed(status, 'h5dopen_f', name, error)) return
+      if (self%fails(status, 'h5dopen_f', name)) return
       call h5dsset_scale_f(set, status, name(index(name, '/', back=.true.) + 1:))
-      if (self%failed(status, 'h5dsset_scale_f', name, error)) continue
+      call self%note(status, 'h5dsset_scale_f', name)
       call h5dclose_f(set, status)
    end subroutine make_scale
 
    !> Attach a dimension scale to one dimension of a data set.
-   subroutine attach_scale(self, name, dimension, scale, error)
-      class(hdf5_file), intent(in) :: self
+   subroutine attach_scale(self, name, dimension, scale)
+      class(hdf5_file), intent(inout) :: self
       character(len=*), intent(in) :: name
       integer, intent(in) :: dimension      !! 1: the first of the Fortran array
       character(len=*), intent(in) :: scale !! data set after `make_scale`
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable :: error
       integer(int64), allocatable :: extent(:)
       integer(hid_t) :: set, scale_set
       integer :: status
 
+      if (allocated(self%error)) return
       call self%get_shape(name, extent, error)
-      if (allocated(error)) return
+      if (allocated(error)) then
+         call move_alloc(error, self%error)
+         return
+      end if
       call h5dopen_f(self%id, name, set, status)
-      if (self%failed(status, 'h5dopen_f', name, error)) return
+      if (self%fails(status, 'h5dopen_f', name)) return
       call h5dopen_f(self%id, scale, scale_set, status)
-      if (.not. self%failed(status, 'h5dopen_f', scale, error)) then
+      if (.not. self%fails(status, 'h5dopen_f', scale)) then
          ! unlike the rest of the Fortran interface, this call counts dimensions (from 1) in C order
          call h5dsattach_scale_f(set, scale_set, size(extent) - dimension + 1, status)
-         if (self%failed(status, 'h5dsattach_scale_f', name//' to '//scale, error)) continue
+         call self%note(status, 'h5dsattach_scale_f', name//' to '//scale)
          call h5dclose_f(scale_set, status)
       end if
       call h5dclose_f(set, status)
@@ -513,100 +518,95 @@ contains
 
    !> Write a text attribute: scalar, fixed length, UTF-8, padded with nulls; of any length. An empty text
    !> is one null. An attribute of that name is replaced.
-   subroutine put_text(self, object, name, value, error)
-      class(hdf5_file), intent(in) :: self
+   subroutine put_text(self, object, name, value)
+      class(hdf5_file), intent(inout) :: self
       character(len=*), intent(in) :: object !! '/' for the root
       character(len=*), intent(in) :: name
       character(len=*), intent(in) :: value
-      type(error_type), allocatable, intent(out) :: error
       integer(hid_t) :: value_type, attribute
       integer :: status
 
+      if (allocated(self%error)) return
       value_type = text_type(len(value), h5t_str_nullpad_f, h5t_cset_utf8_f)
-      call new_attribute(self, object, name, value_type, attribute, error)
-      if (.not. allocated(error)) then
+      call new_attribute(self, object, name, value_type, attribute)
+      if (.not. allocated(self%error)) then
          if (len(value) > 0) then
             call h5awrite_f(attribute, value_type, value, [1_hsize_t], status)
          else
             call h5awrite_f(attribute, value_type, achar(0), [1_hsize_t], status)
          end if
-         if (self%failed(status, 'h5awrite_f', object//'@'//name, error)) continue
+         call self%note(status, 'h5awrite_f', object//'@'//name)
          call h5aclose_f(attribute, status)
       end if
       call h5tclose_f(value_type, status)
    end subroutine put_text
 
-   subroutine put_real(self, object, name, value, error)
-      class(hdf5_file), intent(in) :: self
+   subroutine put_real(self, object, name, value)
+      class(hdf5_file), intent(inout) :: self
       character(len=*), intent(in) :: object, name
       real(wp), intent(in), target :: value
-      type(error_type), allocatable, intent(out) :: error
-      call self%put_number(object, name, h5t_ieee_f64le, h5t_native_double, c_loc(value), error)
+      call self%put_number(object, name, h5t_ieee_f64le, h5t_native_double, c_loc(value))
    end subroutine put_real
 
-   subroutine put_int32(self, object, name, value, error)
-      class(hdf5_file), intent(in) :: self
+   subroutine put_int32(self, object, name, value)
+      class(hdf5_file), intent(inout) :: self
       character(len=*), intent(in) :: object, name
       integer(int32), intent(in), target :: value
-      type(error_type), allocatable, intent(out) :: error
-      call self%put_number(object, name, h5t_std_i32le, h5kind_to_type(int32, h5_integer_kind), c_loc(value), error)
+      call self%put_number(object, name, h5t_std_i32le, h5kind_to_type(int32, h5_integer_kind), c_loc(value))
    end subroutine put_int32
 
-   subroutine put_int64(self, object, name, value, error)
-      class(hdf5_file), intent(in) :: self
+   subroutine put_int64(self, object, name, value)
+      class(hdf5_file), intent(inout) :: self
       character(len=*), intent(in) :: object, name
       integer(int64), intent(in), target :: value
-      type(error_type), allocatable, intent(out) :: error
-      call self%put_number(object, name, h5t_std_i64le, h5kind_to_type(int64, h5_integer_kind), c_loc(value), error)
+      call self%put_number(object, name, h5t_std_i64le, h5kind_to_type(int64, h5_integer_kind), c_loc(value))
    end subroutine put_int64
 
    !> Write a logical as an integer, 0 or 1.
-   subroutine put_logical(self, object, name, value, error)
-      class(hdf5_file), intent(in) :: self
+   subroutine put_logical(self, object, name, value)
+      class(hdf5_file), intent(inout) :: self
       character(len=*), intent(in) :: object, name
       logical, intent(in) :: value
-      type(error_type), allocatable, intent(out) :: error
-      call self%put_int32(object, name, merge(1_int32, 0_int32, value), error)
+      call self%put_int32(object, name, merge(1_int32, 0_int32, value))
    end subroutine put_logical
 
-   subroutine put_number(self, object, name, file_type, memory_type, value, error)
-      class(hdf5_file), intent(in) :: self
+   subroutine put_number(self, object, name, file_type, memory_type, value)
+      class(hdf5_file), intent(inout) :: self
       character(len=*), intent(in) :: object, name
       integer(hid_t), intent(in) :: file_type, memory_type
       type(c_ptr), intent(in) :: value
-      type(error_type), allocatable, intent(out) :: error
       integer(hid_t) :: attribute
       integer :: status
 
-      call new_attribute(self, object, name, file_type, attribute, error)
-      if (allocated(error)) return
+      if (allocated(self%error)) return
+      call new_attribute(self, object, name, file_type, attribute)
+      if (allocated(self%error)) return
       call h5awrite_f(attribute, memory_type, value, status)
-      if (self%failed(status, 'h5awrite_f', object//'@'//name, error)) continue
+      call self%note(status, 'h5awrite_f', object//'@'//name)
       call h5aclose_f(attribute, status)
    end subroutine put_number
 
    !> Make a scalar attribute, in the place of one with that name.
-   subroutine new_attribute(self, object, name, file_type, attribute, error)
-      class(hdf5_file), intent(in) :: self
+   subroutine new_attribute(self, object, name, file_type, attribute)
+      class(hdf5_file), intent(inout) :: self
       character(len=*), intent(in) :: object, name
       integer(hid_t), intent(in) :: file_type
       integer(hid_t), intent(out) :: attribute !! open; the caller closes it
-      type(error_type), allocatable, intent(out) :: error
       integer(hid_t) :: space
       integer :: status
       logical :: present_already
 
       attribute = -1_hid_t
       call h5aexists_by_name_f(self%id, object, name, present_already, status)
-      if (self%failed(status, 'h5aexists_by_name_f', object//'@'//name, error)) return
+      if (self%fails(status, 'h5aexists_by_name_f', object//'@'//name)) return
       if (present_already) then
          call h5adelete_by_name_f(self%id, object, name, status)
-         if (self%failed(status, 'h5adelete_by_name_f', object//'@'//name, error)) return
+         if (self%fails(status, 'h5adelete_by_name_f', object//'@'//name)) return
       end if
       call h5screate_f(h5s_scalar_f, space, status)
-      if (self%failed(status, 'h5screate_f', object//'@'//name, error)) return
+      if (self%fails(status, 'h5screate_f', object//'@'//name)) return
       call h5acreate_by_name_f(self%id, object, name, file_type, space, attribute, status)
-      if (self%failed(status, 'h5acreate_by_name_f', object//'@'//name, error)) continue
+      call self%note(status, 'h5acreate_by_name_f', object//'@'//name)
       call h5sclose_f(space, status)
    end subroutine new_attribute
 
@@ -915,6 +915,26 @@ contains
       if (.not. failed) return
       call raise(error, self%path//": HDF5 call "//call_name//" failed on '"//object//"': "//library_reason())
    end function failed
+
+   !> Keep the failure of a library call in writing, if it is the first.
+   subroutine note(self, status, call_name, object)
+      class(hdf5_file), intent(inout) :: self
+      integer, intent(in) :: status !! the call's return code
+      character(len=*), intent(in) :: call_name, object
+      type(error_type), allocatable :: error
+
+      if (.not. self%failed(status, call_name, object, error)) return
+      if (.not. allocated(self%error)) call move_alloc(error, self%error)
+   end subroutine note
+
+   !> The same; did it fail?
+   logical function fails(self, status, call_name, object)
+      class(hdf5_file), intent(inout) :: self
+      integer, intent(in) :: status
+      character(len=*), intent(in) :: call_name, object
+      call self%note(status, call_name, object)
+      fails = status < 0
+   end function fails
 
    !> The library's own words for its last failure.
    function library_reason() result(text)

@@ -38,18 +38,14 @@ contains
 
       call file%begin(path, force, error)
       if (allocated(error)) return
-      call file%write_provenance(origin, error)
-      if (.not. allocated(error)) call write_axes()
-      if (.not. allocated(error)) call write_eigenvalues()
-      if (.not. allocated(error)) call write_shapes(file, scene, hinges, model, modes, error)
-      if (.not. allocated(error)) call write_state()
-      if (.not. allocated(error)) call write_matrices()
-      if (.not. allocated(error)) call write_summary()
-      if (allocated(error)) then
-         call file%discard()
-      else
-         call file%complete('done', error)
-      end if
+      call file%write_provenance(origin)
+      call write_axes()
+      call write_eigenvalues()
+      call write_shapes(file, scene, hinges, model, modes)
+      call write_state()
+      call write_matrices()
+      call write_summary()
+      call file%complete('done', error)
 
    contains
 
@@ -68,19 +64,17 @@ contains
       subroutine axis(name, values, long_name)
          character(len=*), intent(in) :: name, long_name
          integer, contiguous, intent(in) :: values(:)
-         if (allocated(error)) return
-         call file%file%write(name, values, compression, error)
-         if (.not. allocated(error)) call file%describe(name, '1', long_name, error)
-         if (.not. allocated(error)) call file%file%make_scale(name, error)
+         call file%file%write(name, values, compression)
+         call file%describe(name, '1', long_name)
+         call file%file%make_scale(name)
       end subroutine axis
 
       subroutine names(name, values, long_name)
          character(len=*), intent(in) :: name, values(:), long_name
-         if (allocated(error)) return
-         call file%file%create_texts(name, len(values), size(values), compression, error)
-         if (.not. allocated(error)) call file%file%append(name, values, error)
-         if (.not. allocated(error)) call file%file%put_attribute(name, 'long_name', long_name, error)
-         if (.not. allocated(error)) call file%file%make_scale(name, error)
+         call file%file%create_texts(name, len(values), size(values), compression)
+         call file%file%append(name, values)
+         call file%file%put_attribute(name, 'long_name', long_name)
+         call file%file%make_scale(name)
       end subroutine names
 
       subroutine write_eigenvalues()
@@ -89,28 +83,25 @@ contains
          call per_mode('frequency_damped', aimag(modes%eigenvalue), 'rad s-1', 'frequency of the motion, imaginary part')
          call per_mode('damping_ratio', modes%damping_ratio(), '1', 'decay over natural frequency; -1 or 1 of relaxations')
          call per_mode('decay', modes%decay(), 's-1', 'rate of decay, minus the real part; negative: it grows')
-         if (allocated(error)) return
-         call file%file%create_texts('kind', len(modes%kind), modes%n, compression, error)
-         if (.not. allocated(error)) call file%file%append('kind', modes%kind, error)
-         if (.not. allocated(error)) call file%file%put_attribute('kind', 'long_name', &
-            'rigid body, mechanism, oscillation or relaxation', error)
-         if (.not. allocated(error)) call file%file%attach_scale('kind', 1, 'mode', error)
+         call file%file%create_texts('kind', len(modes%kind), modes%n, compression)
+         call file%file%append('kind', modes%kind)
+         call file%file%put_attribute('kind', 'long_name', 'rigid body, mechanism, oscillation or relaxation')
+         call file%file%attach_scale('kind', 1, 'mode')
       end subroutine write_eigenvalues
 
       subroutine per_mode(name, values, units, long_name)
          character(len=*), intent(in) :: name, units, long_name
          real(wp), contiguous, intent(in) :: values(:)
-         call write_vector(file, name, values, 'mode', units, long_name, error)
+         call write_vector(file, name, values, 'mode', units, long_name)
       end subroutine per_mode
 
       !> The state the equations are linearised about.
       subroutine write_state()
-         call write_vector(file, 'state', model%q(model%kept), 'coordinate', 'm or rad', 'coordinates of the state', error)
-         call write_vector(file, 'state_rate', model%p(model%kept(:model%n)), 'rate', 'm s-1 or rad s-1', 'rates of the state', &
-                           error)
+         call write_vector(file, 'state', model%q(model%kept), 'coordinate', 'm or rad', 'coordinates of the state')
+         call write_vector(file, 'state_rate', model%p(model%kept(:model%n)), 'rate', 'm s-1 or rad s-1', 'rates of the state')
          call write_vector(file, 'state_acceleration', model%acceleration(model%kept(:model%n)), 'rate', &
-                           'm s-2 or rad s-2', 'rates of these rates', error)
-         call write_configuration(file, scene, hinges, model, error)
+                           'm s-2 or rad s-2', 'rates of these rates')
+         call write_configuration(file, scene, hinges, model)
       end subroutine write_state
 
       subroutine write_matrices()
@@ -124,49 +115,47 @@ contains
       subroutine matrix(name, values, column, units, long_name)
          character(len=*), intent(in) :: name, column, units, long_name
          real(wp), contiguous, intent(in) :: values(:, :)
-         call write_table(file, name, transpose(values), column, 'equation', units, long_name, error)
+         call write_table(file, name, transpose(values), column, 'equation', units, long_name)
       end subroutine matrix
 
       subroutine write_summary()
-         call file%file%put_attribute('/', 'at', trim(merge('equilibrium  ', 'initial state', equilibrium)), error)
-         if (.not. allocated(error)) call file%file%put_attribute('/', 'stable', &
-            all([(modes%is_stable(i), i=1, modes%n)]), error)
-         if (.not. allocated(error)) call file%file%put_attribute('/', 'conservative', modes%conservative, error)
-         if (.not. allocated(error)) call file%file%put_attribute('/', 'steady', model%is_steady(modes%fastest), error)
+         call file%file%put_attribute('/', 'at', trim(merge('equilibrium  ', 'initial state', equilibrium)))
+         call file%file%put_attribute('/', 'stable', all([(modes%is_stable(i), i=1, modes%n)]))
+         call file%file%put_attribute('/', 'conservative', modes%conservative)
+         call file%file%put_attribute('/', 'steady', model%is_steady(modes%fastest))
       end subroutine write_summary
 
    end subroutine write_modes
 
    !> All of the state, with what locked hinges make redundant, slopes without inertia, and the hinges.
-   subroutine write_configuration(file, scene, hinges, model, error)
-      type(result_file), intent(in) :: file
+   subroutine write_configuration(file, scene, hinges, model)
+      type(result_file), intent(inout) :: file
       type(scene_type), intent(in) :: scene
       type(hinge_law), intent(in) :: hinges
       type(linear_model), intent(in) :: model
-      type(error_type), allocatable, intent(inout) :: error
       real(wp), dimension(scene%n) :: alpha, beta, alpha_rate, beta_rate
 
       call slopes(scene, hinges, model%q, model%p, alpha, beta, alpha_rate, beta_rate)
-      if (scene%n_base > 0 .and. .not. allocated(error)) then
-         call file%file%put_attribute('/', 'state_displacement_x', model%q(1), error)
-         if (.not. allocated(error)) call file%file%put_attribute('/', 'state_displacement_y', model%q(2), error)
-         if (.not. allocated(error)) call file%file%put_attribute('/', 'state_rotation', model%q(3), error)
+      if (scene%n_base > 0) then
+         call file%file%put_attribute('/', 'state_displacement_x', model%q(1))
+         call file%file%put_attribute('/', 'state_displacement_y', model%q(2))
+         call file%file%put_attribute('/', 'state_rotation', model%q(3))
       end if
       call per_rod('state_phi', model%q(scene%phi_at() + 1:scene%phi_at() + scene%n), 'rad', 'chord angle of the state')
       call per_rod('state_alpha', alpha, 'rad', 'slope of the rod at its inner end')
       call per_rod('state_beta', beta, 'rad', 'slope of the rod at its outer end')
       if (scene%n_bend == 3) call per_rod('state_bubble', model%q(scene%bend_at(3) + 1:scene%bend_at(3) + scene%n), 'm', &
                                           'deflection by the third bending shape')
-      call write_vector(file, 'state_hinge_angle', model%hinge_angle, 'hinge', 'rad', 'rotation of the hinge', error)
+      call write_vector(file, 'state_hinge_angle', model%hinge_angle, 'hinge', 'rad', 'rotation of the hinge')
       call write_vector(file, 'state_hinge_moment', model%hinge_moment, 'hinge', 'N m', &
-                        'moment in the hinge, on its inner body; that of a locked hinge holds it', error)
+                        'moment in the hinge, on its inner body; that of a locked hinge holds it')
 
    contains
 
       subroutine per_rod(name, values, units, long_name)
          character(len=*), intent(in) :: name, units, long_name
          real(wp), contiguous, intent(in) :: values(:)
-         call write_vector(file, name, values, 'rod', units, long_name, error)
+         call write_vector(file, name, values, 'rod', units, long_name)
       end subroutine per_rod
 
    end subroutine write_configuration
@@ -221,13 +210,12 @@ contains
    end function coordinate_names
 
    !> The shapes, one coordinate after the other; what the scene has not is zero, and slopes without inertia follow.
-   subroutine write_shapes(file, scene, hinges, model, modes, error)
-      type(result_file), intent(in) :: file
+   subroutine write_shapes(file, scene, hinges, model, modes)
+      type(result_file), intent(inout) :: file
       type(scene_type), intent(in) :: scene
       type(hinge_law), intent(in) :: hinges
       type(linear_model), intent(in) :: model
       type(mode_set), intent(in) :: modes
-      type(error_type), allocatable, intent(out) :: error
       complex(wp), allocatable :: place(:, :), phi(:, :), alpha(:, :), beta(:, :)
       integer :: i
 
@@ -254,8 +242,8 @@ contains
       subroutine scalar(name, x, units, long_name)
          character(len=*), intent(in) :: name, units, long_name
          complex(wp), contiguous, intent(in) :: x(:)
-         call write_vector(file, name//'_real', real(x, wp), 'mode', units, long_name//', real part of the shape', error)
-         call write_vector(file, name//'_imag', aimag(x), 'mode', units, long_name//', imaginary part of the shape', error)
+         call write_vector(file, name//'_real', real(x, wp), 'mode', units, long_name//', real part of the shape')
+         call write_vector(file, name//'_imag', aimag(x), 'mode', units, long_name//', imaginary part of the shape')
       end subroutine scalar
 
       subroutine table(name, x, scale, long_name, units)
@@ -265,37 +253,33 @@ contains
          character(len=:), allocatable :: unit
          unit = 'rad'
          if (present(units)) unit = units
-         call write_table(file, name//'_real', real(x, wp), scale, 'mode', unit, long_name//', real part of the shape', error)
-         call write_table(file, name//'_imag', aimag(x), scale, 'mode', unit, long_name//', imaginary part of the shape', error)
+         call write_table(file, name//'_real', real(x, wp), scale, 'mode', unit, long_name//', real part of the shape')
+         call write_table(file, name//'_imag', aimag(x), scale, 'mode', unit, long_name//', imaginary part of the shape')
       end subroutine table
 
    end subroutine write_shapes
 
-   !> A data set over one scale. Nothing is written after an error.
-   subroutine write_vector(file, name, values, scale, units, long_name, error)
-      type(result_file), intent(in) :: file
+   !> A data set over one scale.
+   subroutine write_vector(file, name, values, scale, units, long_name)
+      type(result_file), intent(inout) :: file
       character(len=*), intent(in) :: name, scale, units, long_name
       real(wp), contiguous, intent(in) :: values(:)
-      type(error_type), allocatable, intent(inout) :: error
 
-      if (allocated(error)) return
-      call file%file%write(name, values, compression, error)
-      if (.not. allocated(error)) call file%describe(name, units, long_name, error)
-      if (.not. allocated(error)) call file%file%attach_scale(name, 1, scale, error)
+      call file%file%write(name, values, compression)
+      call file%describe(name, units, long_name)
+      call file%file%attach_scale(name, 1, scale)
    end subroutine write_vector
 
    !> The same over two, the one that runs fastest first.
-   subroutine write_table(file, name, values, fast_scale, slow_scale, units, long_name, error)
-      type(result_file), intent(in) :: file
+   subroutine write_table(file, name, values, fast_scale, slow_scale, units, long_name)
+      type(result_file), intent(inout) :: file
       character(len=*), intent(in) :: name, fast_scale, slow_scale, units, long_name
       real(wp), contiguous, intent(in) :: values(:, :)
-      type(error_type), allocatable, intent(inout) :: error
 
-      if (allocated(error)) return
-      call file%file%write(name, values, compression, error)
-      if (.not. allocated(error)) call file%describe(name, units, long_name, error)
-      if (.not. allocated(error)) call file%file%attach_scale(name, 1, fast_scale, error)
-      if (.not. allocated(error)) call file%file%attach_scale(name, 2, slow_scale, error)
+      call file%file%write(name, values, compression)
+      call file%describe(name, units, long_name)
+      call file%file%attach_scale(name, 1, fast_scale)
+      call file%file%attach_scale(name, 2, slow_scale)
    end subroutine write_table
 
    !> Slopes that go with a change of q: they are affine in it.

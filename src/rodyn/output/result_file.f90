@@ -109,10 +109,9 @@ contains
    end function reserve
 
    !> Root attributes: what ran, with what, on what.
-   subroutine write_provenance(self, origin, error)
-      class(result_file), intent(in) :: self
+   subroutine write_provenance(self, origin)
+      class(result_file), intent(inout) :: self
       type(provenance), intent(in) :: origin
-      type(error_type), allocatable, intent(out) :: error
 
       call put('title', text_or_empty(origin%title))
       call put('status', 'running')
@@ -132,19 +131,18 @@ contains
 
       subroutine put(name, value)
          character(len=*), intent(in) :: name, value
-         if (.not. allocated(error)) call self%file%put_attribute('/', name, value, error)
+         call self%file%put_attribute('/', name, value)
       end subroutine put
 
    end subroutine write_provenance
 
    !> Unit and meaning of a data set.
-   subroutine describe(self, name, units, long_name, error)
-      class(result_file), intent(in) :: self
+   subroutine describe(self, name, units, long_name)
+      class(result_file), intent(inout) :: self
       character(len=*), intent(in) :: name, units, long_name
-      type(error_type), allocatable, intent(out) :: error
 
-      call self%file%put_attribute(name, 'units', units, error)
-      if (.not. allocated(error)) call self%file%put_attribute(name, 'long_name', long_name, error)
+      call self%file%put_attribute(name, 'units', units)
+      call self%file%put_attribute(name, 'long_name', long_name)
    end subroutine describe
 
    !> Write the status, close the file and give it its final name.
@@ -153,8 +151,8 @@ contains
       character(len=*), intent(in) :: status !! 'done', 'failed', 'stopped'
       type(error_type), allocatable, intent(out) :: error
 
-      call self%file%put_attribute('/', 'status', status, error)
-      if (.not. allocated(error)) call self%file%flush(error)
+      call self%file%put_attribute('/', 'status', status)
+      call self%file%flush(error)
       if (.not. allocated(error)) call self%file%close(error)
       if (allocated(error)) then
          call self%leave(error)

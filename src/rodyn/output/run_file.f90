@@ -177,9 +177,11 @@ contains
       failure = self%reserve(bytes_at_end + n_sets(self%layout)*bytes_of_layout + len(text_or_empty(header%input)) &
                              + len(self%resolved_input) + len(text_or_empty(header%notes)))
       if (len(failure) > 0) call raise(error, path//': cannot be written: '//failure)
-      if (.not. allocated(error)) call self%write_layout(header%compression, error)
-      if (.not. allocated(error)) call self%write_provenance(header%provenance, error)
-      if (.not. allocated(error)) call self%file%flush(error)
+      if (.not. allocated(error)) then
+         call self%write_layout()
+         call self%write_provenance(header%provenance)
+         call self%file%flush(error)
+      end if
       if (.not. allocated(error)) return
       call self%discard()
       self%lost = error%message
@@ -256,17 +258,18 @@ contains
          if (.not. allocated(self%no_room)) self%no_room = 'events cannot be written: '//failure
          return
       end if
-      call self%file%create_group(events_group, error)
-      if (.not. allocated(error)) call self%file%write('events/time', time, 0, error)
-      if (.not. allocated(error)) call self%file%make_scale('events/time', error)
-      if (.not. allocated(error)) call self%file%write('events/hinge', hinge, 0, error)
-      if (.not. allocated(error)) call self%file%create_texts('events/kind', len(kind), max(1, size(kind)), 0, error)
-      if (.not. allocated(error)) call self%file%append('events/kind', kind, error)
-      if (.not. allocated(error)) call self%file%write('events/energy_lost', energy_lost, 0, error)
+      call self%file%create_group(events_group)
+      call self%file%write('events/time', time, 0)
+      call self%file%make_scale('events/time')
+      call self%file%write('events/hinge', hinge, 0)
+      call self%file%create_texts('events/kind', len(kind), max(1, size(kind)), 0)
+      call self%file%append('events/kind', kind)
+      call self%file%write('events/energy_lost', energy_lost, 0)
       do i = 1, size(names)
-         if (.not. allocated(error)) call self%describe(trim(names(i)), trim(units(i)), trim(meanings(i)), error)
-         if (i > 1 .and. .not. allocated(error)) call self%file%attach_scale(trim(names(i)), 1, 'events/time', error)
+         call self%describe(trim(names(i)), trim(units(i)), trim(meanings(i)))
+         if (i > 1) call self%file%attach_scale(trim(names(i)), 1, 'events/time')
       end do
+      call self%file%tell(error)
       if (allocated(error)) call self%give_up(error)
    end subroutine write_events
 
@@ -297,15 +300,11 @@ contains
       if (outcome == 'failed' .and. self%force) call step_aside(self%path)
       warnings = text_or_empty(report%warnings)
       if (len(self%reserve(bytes_at_end + len(warnings))) > 0) warnings = 'left out: no space left'
-      call self%write_solver_report(report, error)
-      if (.not. allocated(error)) call self%file%put_attribute('/', 't_reached', self%last_time, error)
-      if (.not. allocated(error)) call self%file%put_attribute('/', 'warnings', warnings, error)
-      if (.not. allocated(error) .and. outcome /= 'done') call self%file%put_attribute('/', 'message', reason, error)
-      if (allocated(error)) then
-         call self%give_up(error)
-      else
-         call self%complete(outcome, error)
-      end if
+      call self%write_solver_report(report)
+      call self%file%put_attribute('/', 't_reached', self%last_time)
+      call self%file%put_attribute('/', 'warnings', warnings)
+      if (outcome /= 'done') call self%file%put_attribute('/', 'message', reason)
+      call self%complete(outcome, error)
       if (.not. allocated(error) .and. outcome /= status) &
          call raise(error, reason//' (rows until then are in '//self%path//')')
    end subroutine finish
@@ -326,83 +325,57 @@ contains
    end subroutine step_aside
 
    !> All data sets, coordinates attached, and the group `solver`.
-   subroutine write_layout(self, compression, error)
+   subroutine write_layout(self)
       class(run_file), intent(inout) :: self
-      integer, intent(in) :: compression !! gzip level
-      type(error_type), allocatable, intent(out) :: error
       character(len=:), allocatable :: name
       integer :: i
 
       do i = 1, size(chain_axes)
          name = trim(chain_axes(i)%name)
-         call self%file%write(name, entries(chain_axes(i), self%layout%n_rods), compression, error)
-         if (.not. allocated(error)) call self%describe(name, '1', trim(chain_axes(i)%long_name), error)
-         if (.not. allocated(error)) call self%file%make_scale(name, error)
-         if (allocated(error)) return
+         call self%file%write(name, entries(chain_axes(i), self%layout%n_rods), self%compression)
+         call self%describe(name, '1', trim(chain_axes(i)%long_name))
+         call self%file%make_scale(name)
       end do
-      call self%file%create_series('time', [integer ::], self%block_rows, compression, error)
-      if (.not. allocated(error)) call self%describe('time', 's', 'time', error)
-      if (.not. allocated(error)) call self%file%make_scale('time', error)
+      call self%file%create_series('time', [integer ::], self%block_rows, self%compression)
+      call self%describe('time', 's', 'time')
+      call self%file%make_scale('time')
       do i = 1, size(self%layout%quantities)
          associate (x => self%layout%quantities(i))
             name = trim(x%name)
-            if (.not. allocated(error)) call self%file%create_series(name, self%layout%row_shape(i), self%block_rows, compression, &
-                                                                     error)
-            if (.not. allocated(error)) call self%describe(name, trim(x%units), trim(x%long_name), error)
-            if (x%along > 0 .and. .not. allocated(error)) &
-               call self%file%attach_scale(name, 1, trim(chain_axes(x%along)%name), error)
-            if (.not. allocated(error)) call self%file%attach_scale(name, merge(2, 1, x%along > 0), 'time', error)
+            call self%file%create_series(name, self%layout%row_shape(i), self%block_rows, self%compression)
+            call self%describe(name, trim(x%units), trim(x%long_name))
+            if (x%along > 0) call self%file%attach_scale(name, 1, trim(chain_axes(x%along)%name))
+            call self%file%attach_scale(name, merge(2, 1, x%along > 0), 'time')
          end associate
       end do
-      if (.not. allocated(error)) call self%file%create_group(solver_group, error)
+      call self%file%create_group(solver_group)
    end subroutine write_layout
 
    !> The attributes of the group `solver`.
-   subroutine write_solver_report(self, report, error)
-      class(run_file), intent(in) :: self
+   subroutine write_solver_report(self, report)
+      class(run_file), intent(inout) :: self
       type(solver_report), intent(in) :: report
-      type(error_type), allocatable, intent(out) :: error
 
-      call put_text('method', text_or_empty(report%method))
-      call put_text('reason', text_or_empty(report%reason))
-      call put_text('kernel', text_or_empty(report%kernel))
-      if (.not. allocated(error)) call self%file%put_attribute(solver_group, 'order', report%options%order, error)
-      call put_real('rtol', report%options%rtol)
-      call put_real('atol', report%options%atol)
-      call put_real('max_step', report%options%max_step)
-      call put_real('fixed_step', report%options%fixed_step)
-      call put_real('last_step', report%last_step)
-      call put_count('n_steps', report%n_steps)
-      call put_count('n_rhs', report%n_rhs)
-      call put_count('n_jac', report%n_jac)
-      call put_count('n_nonlinear_failures', report%n_nonlinear_failures)
-      call put_count('n_error_test_failures', report%n_error_test_failures)
-      call put_count('n_restarts', report%n_restarts)
+      call self%file%put_attribute(solver_group, 'method', text_or_empty(report%method))
+      call self%file%put_attribute(solver_group, 'reason', text_or_empty(report%reason))
+      call self%file%put_attribute(solver_group, 'kernel', text_or_empty(report%kernel))
+      call self%file%put_attribute(solver_group, 'order', report%options%order)
+      call self%file%put_attribute(solver_group, 'rtol', report%options%rtol)
+      call self%file%put_attribute(solver_group, 'atol', report%options%atol)
+      call self%file%put_attribute(solver_group, 'max_step', report%options%max_step)
+      call self%file%put_attribute(solver_group, 'fixed_step', report%options%fixed_step)
+      call self%file%put_attribute(solver_group, 'last_step', report%last_step)
+      call self%file%put_attribute(solver_group, 'n_steps', report%n_steps)
+      call self%file%put_attribute(solver_group, 'n_rhs', report%n_rhs)
+      call self%file%put_attribute(solver_group, 'n_jac', report%n_jac)
+      call self%file%put_attribute(solver_group, 'n_nonlinear_failures', report%n_nonlinear_failures)
+      call self%file%put_attribute(solver_group, 'n_error_test_failures', report%n_error_test_failures)
+      call self%file%put_attribute(solver_group, 'n_restarts', report%n_restarts)
       if (self%layout%before('work_external') >= 0) then
-         call put_real('work_external_error', report%work_external_error)
-         call put_real('energy_dissipated_error', report%energy_dissipated_error)
+         call self%file%put_attribute(solver_group, 'work_external_error', report%work_external_error)
+         call self%file%put_attribute(solver_group, 'energy_dissipated_error', report%energy_dissipated_error)
       end if
-      call put_real('wall_seconds', report%wall_seconds)
-
-   contains
-
-      subroutine put_text(name, value)
-         character(len=*), intent(in) :: name, value
-         if (.not. allocated(error)) call self%file%put_attribute(solver_group, name, value, error)
-      end subroutine put_text
-
-      subroutine put_real(name, value)
-         character(len=*), intent(in) :: name
-         real(wp), intent(in) :: value
-         if (.not. allocated(error)) call self%file%put_attribute(solver_group, name, value, error)
-      end subroutine put_real
-
-      subroutine put_count(name, value)
-         character(len=*), intent(in) :: name
-         integer(i8), intent(in) :: value
-         if (.not. allocated(error)) call self%file%put_attribute(solver_group, name, value, error)
-      end subroutine put_count
-
+      call self%file%put_attribute(solver_group, 'wall_seconds', report%wall_seconds)
    end subroutine write_solver_report
 
    !> Write the rows that wait, as far as there is room for them. Those that find none are dropped.
@@ -463,19 +436,18 @@ contains
       integer :: i
 
       associate (first => self%written + 1)
-         call self%file%append('time', self%times(first:last), error)
+         call self%file%append('time', self%times(first:last))
          do i = 1, size(self%layout%quantities)
             associate (x => self%layout%quantities(i))
-               if (allocated(error)) cycle
                if (x%along > 0) then
-                  call self%file%append(trim(x%name), self%values(x%first:x%last, first:last), error)
+                  call self%file%append(trim(x%name), self%values(x%first:x%last, first:last))
                else
-                  call self%file%append(trim(x%name), self%values(x%first, first:last), error)
+                  call self%file%append(trim(x%name), self%values(x%first, first:last))
                end if
             end associate
          end do
       end associate
-      if (.not. allocated(error)) call self%file%flush(error)
+      call self%file%flush(error)
       if (allocated(error)) then
          call self%give_up(error)
          return

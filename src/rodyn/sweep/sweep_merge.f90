@@ -75,7 +75,7 @@ contains
 
    !> Layout, then blocks of cases, then what coordinates belong to.
    subroutine write_all(file, sweep, plan, shape, index, error)
-      type(hdf5_file), intent(in) :: file
+      type(hdf5_file), intent(inout) :: file
       type(sweep_config), intent(in) :: sweep
       type(sweep_plan), intent(in) :: plan
       type(case_shape), intent(in) :: shape
@@ -87,18 +87,18 @@ contains
 
       block_cases = cases_per_block(shape, plan%n_cases)
       message_length = min(longest_message, maxval(index%message_bytes))
-      call write_header(file, sweep, plan, error)
-      if (.not. allocated(error)) call write_layout(file, sweep, shape, block_cases, message_length, error)
-      if (allocated(error)) return
+      call write_header(file, sweep, plan)
+      call write_layout(file, sweep, shape, block_cases, message_length)
       call new_block(block, kept, shape, block_cases, message_length)
       do first = 1, plan%n_cases, block_cases
          n = min(block_cases, plan%n_cases - first + 1)
-         call fill_block(block, kept, plan, shape, index, first, n, error)
-         if (.not. allocated(error)) call append_block(file, block, shape, error)
-         if (.not. allocated(error)) call append_parameters(file, sweep, plan, first, n, error)
+         call file%tell(error)
+         if (.not. allocated(error)) call fill_block(block, kept, plan, shape, index, first, n, error)
          if (allocated(error)) return
+         call append_block(file, block, shape)
+         call append_parameters(file, sweep, plan, first, n)
       end do
-      call attach_all(file, sweep, shape, error)
+      call attach_all(file, sweep, shape)
    end subroutine write_all
 
    !> As many cases as the memory for a block allows.
@@ -169,11 +169,10 @@ contains
    end subroutine fill_block
 
    !> What the sweep was, and with what it was made. No host and no date: results do not depend on them.
-   subroutine write_header(file, sweep, plan, error)
-      type(hdf5_file), intent(in) :: file
+   subroutine write_header(file, sweep, plan)
+      type(hdf5_file), intent(inout) :: file
       type(sweep_config), intent(in) :: sweep
       type(sweep_plan), intent(in) :: plan
-      type(error_type), allocatable, intent(out) :: error
 
       call put('title', sweep%base_case%title)
       call put('program_version', program_version)
@@ -186,45 +185,44 @@ contains
       call put('base_input', sweep%base_text)
       call put('resolved_base', resolved_case(sweep%base_case))
       call put('lanes', lanes_text(sweep, plan))
-      if (.not. allocated(error)) call file%put_attribute('/', 'n_cases', plan%n_cases, error)
+      call file%put_attribute('/', 'n_cases', plan%n_cases)
 
    contains
 
       subroutine put(name, value)
          character(len=*), intent(in) :: name, value
-         if (.not. allocated(error)) call file%put_attribute('/', name, value, error)
+         call file%put_attribute('/', name, value)
       end subroutine put
 
    end subroutine write_header
 
    !> All data sets that grow with the cases, empty; coordinates.
-   subroutine write_layout(file, sweep, shape, block_cases, message_length, error)
-      type(hdf5_file), intent(in) :: file
+   subroutine write_layout(file, sweep, shape, block_cases, message_length)
+      type(hdf5_file), intent(inout) :: file
       type(sweep_config), intent(in) :: sweep
       type(case_shape), intent(in) :: shape
       integer, intent(in) :: block_cases, message_length
-      type(error_type), allocatable, intent(out) :: error
       character(len=:), allocatable :: state
       integer :: a, compression, i
 
       compression = sweep%base_case%output%compression
 
       if (shape%layout%n_values > 0) then
-         call file%write('probe_time', sweep%probe_times, compression, error)
+         call file%write('probe_time', sweep%probe_times, compression)
          call describe('probe_time', 's', 'time at which the state of each case is kept')
       end if
       do i = 1, size(chain_axes)
          if (.not. shape%layout%counts(i)) cycle
-         if (.not. allocated(error)) call file%write(trim(chain_axes(i)%name), entries(chain_axes(i), shape%layout%n_rods), &
-                                                     compression, error)
+         call file%write(trim(chain_axes(i)%name), entries(chain_axes(i), shape%layout%n_rods), &
+                         compression)
          call describe(trim(chain_axes(i)%name), '1', trim(chain_axes(i)%long_name))
       end do
       if (shape%n_modes > 0) then
-         if (.not. allocated(error)) call file%write('mode', [(i, i=1, shape%n_modes)], compression, error)
+         call file%write('mode', [(i, i=1, shape%n_modes)], compression)
          call describe('mode', '1', 'oscillation, by rising natural frequency')
       end if
       if (shape%n_rows > 0) then
-         if (.not. allocated(error)) call file%write('row', [(i - 1, i=1, shape%n_rows)], compression, error)
+         call file%write('row', [(i - 1, i=1, shape%n_rows)], compression)
          call describe('row', '1', 'output time of a case, counted from its start')
       end if
       call make('case', [integer ::], 'integer', '1', 'case; the last axis runs fastest')
@@ -274,21 +272,21 @@ contains
       subroutine make(name, row, kind_of, units, long_name)
          character(len=*), intent(in) :: name, kind_of, units, long_name
          integer, intent(in) :: row(:)
-         if (.not. allocated(error)) call file%create_series(name, row, block_cases, compression, error, kind_of == 'integer')
+         call file%create_series(name, row, block_cases, compression, kind_of == 'integer')
          call describe(name, units, long_name)
       end subroutine make
 
       subroutine make_texts(name, length, long_name)
          character(len=*), intent(in) :: name, long_name
          integer, intent(in) :: length
-         if (.not. allocated(error)) call file%create_texts(name, length, block_cases, compression, error)
+         call file%create_texts(name, length, block_cases, compression)
          call describe(name, '', long_name)
       end subroutine make_texts
 
       subroutine describe(name, units, long_name)
          character(len=*), intent(in) :: name, units, long_name
-         if (.not. allocated(error) .and. len(units) > 0) call file%put_attribute(name, 'units', units, error)
-         if (.not. allocated(error)) call file%put_attribute(name, 'long_name', long_name, error)
+         if (len(units) > 0) call file%put_attribute(name, 'units', units)
+         call file%put_attribute(name, 'long_name', long_name)
       end subroutine describe
 
    end subroutine write_layout
@@ -301,71 +299,60 @@ contains
    end function unit_or_one
 
    !> Append the results of a block.
-   subroutine append_block(file, block, shape, error)
-      type(hdf5_file), intent(in) :: file
+   subroutine append_block(file, block, shape)
+      type(hdf5_file), intent(inout) :: file
       type(case_block), intent(in) :: block
       type(case_shape), intent(in) :: shape
-      type(error_type), allocatable, intent(out) :: error
       integer :: i
 
       associate (n => block%n)
-         call file%append('case', block%number(:n), error)
-         if (.not. allocated(error)) call file%append('status', block%status(:n), error)
-         if (.not. allocated(error)) call file%append('message', block%message(:n), error)
-         if (.not. allocated(error)) call file%append('t_reached', block%t_reached(:n), error)
-         if (.not. allocated(error)) call file%append('n_steps', block%n_steps(:n), error)
-         if (.not. allocated(error)) call file%append('n_rhs', block%n_rhs(:n), error)
-         if (.not. allocated(error)) call file%append('same_as', block%same_as(:n), error)
-         if (.not. allocated(error)) call file%append('wall_seconds', block%wall_seconds(:n), error)
+         call file%append('case', block%number(:n))
+         call file%append('status', block%status(:n))
+         call file%append('message', block%message(:n))
+         call file%append('t_reached', block%t_reached(:n))
+         call file%append('n_steps', block%n_steps(:n))
+         call file%append('n_rhs', block%n_rhs(:n))
+         call file%append('same_as', block%same_as(:n))
+         call file%append('wall_seconds', block%wall_seconds(:n))
          if (shape%n_modes > 0) then
-            if (.not. allocated(error)) call file%append('frequency', block%frequency(:, :n), error)
-            if (.not. allocated(error)) call file%append('damping_ratio', block%damping_ratio(:, :n), error)
+            call file%append('frequency', block%frequency(:, :n))
+            call file%append('damping_ratio', block%damping_ratio(:, :n))
          end if
          do i = 1, size(shape%layout%quantities)
-            if (.not. allocated(error)) call append_quantity(file, block, shape, shape%layout%quantities(i), error)
+            call append_quantity(file, block, shape, shape%layout%quantities(i))
          end do
-         if (.not. allocated(error) .and. shape%n_rows > 0) call file%append('series_time', block%times(:, :n), error)
+         if (shape%n_rows > 0) call file%append('series_time', block%times(:, :n))
       end associate
    end subroutine append_block
 
    !> One of the quantities that are kept of each case.
-   subroutine append_quantity(file, block, shape, x, error)
-      type(hdf5_file), intent(in) :: file
+   subroutine append_quantity(file, block, shape, x)
+      type(hdf5_file), intent(inout) :: file
       type(case_block), intent(in) :: block
       type(case_shape), intent(in) :: shape
       type(quantity), intent(in) :: x
-      type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: part_2(:, :), part_3(:, :, :) ! contiguous copies
       character(len=:), allocatable :: name
 
       name = trim(x%name)
-      associate (n => block%n)
+      associate (n => block%n, first => x%first, last => x%last)
          if (x%along > 0) then
-            part_3 = block%probes(x%first:x%last, :, :n)
-            call file%append(name, part_3, error)
-            part_2 = block%final(x%first:x%last, :n)
-            if (.not. allocated(error)) call file%append('final_'//name, part_2, error)
-            if (shape%n_rows == 0) return
-            part_3 = block%series(x%first:x%last, :, :n)
-            if (.not. allocated(error)) call file%append('series_'//name, part_3, error)
+            call file%append(name, block%probes(first:last, :, :n))
+            call file%append('final_'//name, block%final(first:last, :n))
+            if (shape%n_rows > 0) call file%append('series_'//name, block%series(first:last, :, :n))
          else
-            part_2 = block%probes(x%first, :, :n)
-            call file%append(name, part_2, error)
-            if (.not. allocated(error)) call file%append('final_'//name, [block%final(x%first, :n)], error)
-            if (shape%n_rows == 0) return
-            part_2 = block%series(x%first, :, :n)
-            if (.not. allocated(error)) call file%append('series_'//name, part_2, error)
+            call file%append(name, block%probes(first, :, :n))
+            call file%append('final_'//name, block%final(first, :n))
+            if (shape%n_rows > 0) call file%append('series_'//name, block%series(first, :, :n))
          end if
       end associate
    end subroutine append_quantity
 
    !> The values of the axes in cases first, first + 1, ...
-   subroutine append_parameters(file, sweep, plan, first, n, error)
-      type(hdf5_file), intent(in) :: file
+   subroutine append_parameters(file, sweep, plan, first, n)
+      type(hdf5_file), intent(inout) :: file
       type(sweep_config), intent(in) :: sweep
       type(sweep_plan), intent(in) :: plan
       integer, intent(in) :: first, n
-      type(error_type), allocatable, intent(out) :: error
       integer :: rows(size(plan%dimensions), n)
       real(wp), allocatable :: numbers(:)
       character(len=:), allocatable :: texts(:)
@@ -378,51 +365,49 @@ contains
          associate (axis => sweep%axes(a))
             if (axis%textual) then
                texts = axis%texts(rows(axis%dimension, :))
-               call file%append('param_'//trim(axis%key), texts, error)
+               call file%append('param_'//trim(axis%key), texts)
             else
                numbers = axis%numbers(rows(axis%dimension, :))
-               call file%append('param_'//trim(axis%key), numbers, error)
+               call file%append('param_'//trim(axis%key), numbers)
             end if
          end associate
-         if (allocated(error)) return
       end do
    end subroutine append_parameters
 
    !> Dimension scales, as xarray wants them.
-   subroutine attach_all(file, sweep, shape, error)
-      type(hdf5_file), intent(in) :: file
+   subroutine attach_all(file, sweep, shape)
+      type(hdf5_file), intent(inout) :: file
       type(sweep_config), intent(in) :: sweep
       type(case_shape), intent(in) :: shape
-      type(error_type), allocatable, intent(out) :: error
       character(len=*), parameter :: plain(7) = [character(len=12) :: 'status', 'message', 't_reached', 'n_steps', 'n_rhs', &
                                                  'same_as', 'wall_seconds']
       integer :: a, i
 
-      call file%make_scale('case', error)
-      if (.not. allocated(error) .and. shape%layout%n_values > 0) call file%make_scale('probe_time', error)
+      call file%make_scale('case')
+      if (shape%layout%n_values > 0) call file%make_scale('probe_time')
       do i = 1, size(chain_axes)
-         if (shape%layout%counts(i) .and. .not. allocated(error)) call file%make_scale(trim(chain_axes(i)%name), error)
+         if (shape%layout%counts(i)) call file%make_scale(trim(chain_axes(i)%name))
       end do
-      if (.not. allocated(error) .and. shape%n_modes > 0) call file%make_scale('mode', error)
-      if (.not. allocated(error) .and. shape%n_rows > 0) call file%make_scale('row', error)
+      if (shape%n_modes > 0) call file%make_scale('mode')
+      if (shape%n_rows > 0) call file%make_scale('row')
       do i = 1, size(plain)
-         call attach(trim(plain(i)), 1, 'case')
+         call file%attach_scale(trim(plain(i)), 1, 'case')
       end do
       do a = 1, size(sweep%axes)
-         call attach('param_'//trim(sweep%axes(a)%key), 1, 'case')
+         call file%attach_scale('param_'//trim(sweep%axes(a)%key), 1, 'case')
       end do
       if (shape%n_modes > 0) then
-         call attach('frequency', 1, 'mode')
-         call attach('frequency', 2, 'case')
-         call attach('damping_ratio', 1, 'mode')
-         call attach('damping_ratio', 2, 'case')
+         call file%attach_scale('frequency', 1, 'mode')
+         call file%attach_scale('frequency', 2, 'case')
+         call file%attach_scale('damping_ratio', 1, 'mode')
+         call file%attach_scale('damping_ratio', 2, 'case')
       end if
       do i = 1, size(shape%layout%quantities)
          call attach_quantity(trim(shape%layout%quantities(i)%name), shape%layout%quantities(i)%along)
       end do
       if (shape%n_rows == 0) return
-      call attach('series_time', 1, 'row')
-      call attach('series_time', 2, 'case')
+      call file%attach_scale('series_time', 1, 'row')
+      call file%attach_scale('series_time', 2, 'case')
 
    contains
 
@@ -433,23 +418,17 @@ contains
 
          before = min(along, 1)
          if (along > 0) then
-            call attach(name, 1, trim(chain_axes(along)%name))
-            call attach('final_'//name, 1, trim(chain_axes(along)%name))
+            call file%attach_scale(name, 1, trim(chain_axes(along)%name))
+            call file%attach_scale('final_'//name, 1, trim(chain_axes(along)%name))
          end if
-         call attach(name, before + 1, 'probe_time')
-         call attach(name, before + 2, 'case')
-         call attach('final_'//name, before + 1, 'case')
+         call file%attach_scale(name, before + 1, 'probe_time')
+         call file%attach_scale(name, before + 2, 'case')
+         call file%attach_scale('final_'//name, before + 1, 'case')
          if (shape%n_rows == 0) return
-         if (along > 0) call attach('series_'//name, 1, trim(chain_axes(along)%name))
-         call attach('series_'//name, before + 1, 'row')
-         call attach('series_'//name, before + 2, 'case')
+         if (along > 0) call file%attach_scale('series_'//name, 1, trim(chain_axes(along)%name))
+         call file%attach_scale('series_'//name, before + 1, 'row')
+         call file%attach_scale('series_'//name, before + 2, 'case')
       end subroutine attach_quantity
-
-      subroutine attach(name, dimension, scale)
-         character(len=*), intent(in) :: name, scale
-         integer, intent(in) :: dimension
-         if (.not. allocated(error)) call file%attach_scale(name, dimension, scale, error)
-      end subroutine attach
 
    end subroutine attach_all
 
