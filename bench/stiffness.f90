@@ -16,7 +16,7 @@ program bench_stiffness
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics
    use rodyn_integrators, only: new_integrator
    use rodyn_method_choice, only: method_choice, choose_method
-   use rodyn_method_trial, only: candidates, effort_of
+   use rodyn_method_costs, only: candidates, effort_of
    use rodyn_hdf5_files, only: hdf5_file
    implicit none (type, external)
 

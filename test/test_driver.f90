@@ -8,7 +8,7 @@ module test_driver
    use rodyn_run_setup, only: run_setup, new_run_setup
    use rodyn_integrator, only: integrator_type, solver_statistics
    use rodyn_driver, only: driver_type, new_driver
-   use rodyn_method_trial, only: effort_of
+   use rodyn_method_costs, only: effort_of
    use rodyn_simulation, only: observer_type, even_times, simulate
    use test_testing, only: unittest, new_test, check, check_close
    implicit none (type, external)
@@ -280,7 +280,7 @@ contains
    !> Let a member work as it does, and give up.
    subroutine make_quit(driver, motion, member, t_quit)
       use rodyn_integrators, only: new_integrator
-      use rodyn_method_trial, only: candidates
+      use rodyn_method_costs, only: candidates
       type(driver_type), intent(inout) :: driver
       type(motion_type), target, intent(inout) :: motion
       integer, intent(in) :: member

@@ -10,7 +10,7 @@ module test_method_choice
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics
    use rodyn_integrators, only: new_integrator
    use rodyn_method_choice, only: method_choice, choose_method
-   use rodyn_method_trial, only: candidates, effort_of
+   use rodyn_method_costs, only: candidates, effort_of
    use test_testing, only: unittest, new_test, check
    use test_random_scenes, only: allocate_case, random_case, seed_random, kind_name, n_kinds
    implicit none (type, external)

@@ -27,7 +27,6 @@ module rodyn_methods
       integer :: highest_order = 0
       logical :: fixed_steps = .false. !! it can take them
       logical :: multistep = .false.   !! errors add up from period to period of a vibration
-      logical :: needs_lanes = .false. !! it integrates systems only whose right-hand side is there in vector lanes, with modes
       logical :: in_lanes = .false.    !! like systems go side by side in vector lanes (`rodyn_lane_dop853`)
    end type method_type
 
@@ -36,7 +35,7 @@ module rodyn_methods
       method_type('bdf', 1, 5, multistep=.true.), &
       method_type('erk', 2, 8, fixed_steps=.true.), &
       method_type('dop853', 8, 8, fixed_steps=.true., in_lanes=.true.), &
-      method_type('gauss', 16, 16, fixed_steps=.true., needs_lanes=.true.)]
+      method_type('gauss', 16, 16, fixed_steps=.true.)]
 
    !> The same names as the words of a key.
    character(len=*), parameter :: method_words = 'adams|bdf|erk|dop853|gauss'

@@ -16,21 +16,15 @@ module rodyn_driver
    use rodyn_integrator, only: integrator_type, monitor_type, solver_options, solver_statistics
    use rodyn_integrators, only: new_integrator
    use rodyn_method_choice, only: method_choice, choose_method, named_method
-   use rodyn_method_trial, only: candidates, effort_of, explicit_step, n_even
+   use rodyn_method_costs, only: candidates, collocation, effort_of, explicit, n_even
+   use rodyn_method_numbers, only: clear_advantage, effort_of_rates, explicit_step, most_verdicts, postponed, probation, &
+      short_probation, trial_share, trials_free, watch_steps
    use rodyn_motion, only: motion_type
    use rodyn_step_limit, only: check_fixed_step
    implicit none (type, external)
    private
    public :: driver_type, new_driver
 
-   real(wp), parameter :: probation = 1500.0_wp   !! right-hand sides of explicit steps that are not worth a choice
-   real(wp), parameter :: short_probation = 300.0_wp !! likewise where it is known already: what BDF needs to get going
-   real(wp), parameter :: trial_share = 0.3_wp    !! of the run that later trials may cost together, beside
-   real(wp), parameter :: effort_of_rates = 300.0_wp !! of a choice beside its trial
-   real(wp), parameter :: trials_free = 3000.0_wp !! right-hand sides
-   real(wp), parameter :: clear_advantage = 3.0_wp !! over explicit steps, from where an implicit method is far ahead
-   integer, parameter :: watch_steps = 200        !! of BDF, after which its pace is judged
-   integer, parameter :: most_verdicts = 64       !! that are remembered
    integer, parameter :: most_lines = 12          !! of the history
 
    !> A method that may take part. Made when it is first needed.
@@ -156,12 +150,9 @@ contains
       if (self%n_choices > 0) self%tried = self%tried + choice%effort + effort_of_rates
       self%n_choices = self%n_choices + 1
       self%on_probation = .not. choice%conclusive
-      if (self%on_probation) self%next_choice = 2.0_wp*effort_of_run(self)
+      if (self%on_probation) self%next_choice = postponed*effort_of_run(self)
       member = findloc(self%members%gave_up, .false., dim=1)
-      do i = 1, size(candidates)
-         if (candidates(i)%method == choice%method .and. candidates(i)%order == choice%options%order .and. &
-             .not. self%members(i)%gave_up) member = i
-      end do
+      if (.not. self%members(choice%candidate)%gave_up) member = choice%candidate
       self%pace = 0.0_wp
       if (self%on_probation) return
       verdict = verdict_type(motion%dynamics%hinges%mechanisms%law_number(), member, choice%reason(), &
@@ -180,7 +171,7 @@ contains
    real(wp) function most_trial(self)
       type(driver_type), intent(inout) :: self
       most_trial = huge(1.0_wp)
-      if (self%n_choices > 0 .and. .not. self%members(1)%gave_up) &
+      if (self%n_choices > 0 .and. .not. self%members(explicit)%gave_up) &
          most_trial = max(trials_free, trials_free + trial_share*effort_of_run(self) - self%tried)
    end function most_trial
 
@@ -232,12 +223,12 @@ contains
       if (known > 0) member = self%verdicts(known)%member
       if (known > 0 .and. (self%timed .or. member <= n_even)) then
          call follow(self, known, member)
-      else if ((self%timed .and. may_choose(self)) .or. self%members(1)%gave_up) then
+      else if ((self%timed .and. may_choose(self)) .or. self%members(explicit)%gave_up) then
          call judge_here(self, member)
       else
          self%on_probation = .true.
          self%why = 'explicit steps after an event'
-         member = 1
+         member = explicit
       end if
    end subroutine reconsider
 
@@ -482,7 +473,7 @@ contains
       type(driver_type), intent(in) :: self
       integer, intent(in) :: member
       suits = .not. self%members(member)%gave_up
-      if (candidates(member)%method == 'gauss') suits = suits .and. self%motion%has_lanes()
+      if (member == collocation) suits = suits .and. self%motion%has_lanes()
    end function suits
 
    !> Name of a member's method.

@@ -10,18 +10,20 @@ module rodyn_method_choice
    use rodyn_kinds, only: wp
    use rodyn_text, only: to_text, formatted, time_text
    use rodyn_motion, only: motion_type
-   use rodyn_accelerations, only: dynamics_type
-   use rodyn_scene_modes, only: most_dof
    use rodyn_fastest_rates, only: fastest_rates, with_rigid_rods
    use rodyn_integrator, only: monitor_type, solver_options
-   use rodyn_method_trial, only: fast_rates, candidates, n_even, effort_of_nodes, effort_of_modes, effort_of_step, &
-      effort_of_coupling, effort_of_output, explicit_step, try_methods
+   use rodyn_method_costs, only: candidates, collocation, effort_of_output, expected_efforts, expected_steps, explicit, &
+      fast_rates, n_even, vibrating
+   use rodyn_method_numbers, only: even_lead, lead, lead_over_events, mostly_damped, short_run, stiff_damped_from, stiff_from, &
+      stiff_power
+   use rodyn_method_trial, only: try_methods
    implicit none (type, external)
    private
    public :: method_choice, choose_method, named_method
 
    type :: method_choice
       character(len=:), allocatable :: method !! name of an integrator
+      integer :: candidate = 0                !! of `auto`
       type(solver_options) :: options         !! the user's, with the order that was chosen
       logical :: automatic = .false.          !! `auto` chose
       logical :: tried = .false.              !! after a trial
@@ -34,15 +36,6 @@ module rodyn_method_choice
    contains
       procedure :: reason
    end type method_choice
-
-   real(wp), parameter :: stability_limit = 6.4_wp !! step times decay rate that it bears
-   real(wp), parameter :: coupling_decay = 0.3_wp !! over the frequency, from where dampers couple modes of collocation
-   real(wp), parameter :: lasting = 150.0_wp       !! times the fastest decay that vibrations with dampers last
-   real(wp), parameter :: short_run = 1500.0_wp    !! right-hand sides that are not worth a trial
-   real(wp), parameter :: lead = 1.1_wp            !! by which an implicit method must be faster: it is less accurate
-   real(wp), parameter :: lead_over_events = 2.0_wp !! likewise where hinges may have events: after each it begins anew, at order 1
-   real(wp), parameter :: even_lead = 1.2_wp       !! by which collocation must be ahead of explicit steps without a trial: these
-                                                   !! gain more where loads are smooth and do not excite the fastest vibrations
 
 contains
 
@@ -63,12 +56,12 @@ contains
 
       choice%options = options
       choice%automatic = .true.
-      choice%method = 'dop853'
+      call take(choice, explicit)
       span = t_end - t
-      available = [.not. out(1), .not. out(2) .and. motion%has_lanes()]
+      available = [.not. out(explicit), .not. out(collocation) .and. motion%has_lanes()]
       associate (scene => motion%dynamics%scene, rates => choice%rates)
          call fastest_rates(scene, motion%dynamics%hinges, y(:scene%n_q), rates%frequency, rates%decay)
-         choice%steps = expected_steps('dop853', options, rates, span)
+         choice%steps = expected_steps(explicit, options, rates, span)
          ratio = 1.0_wp
          outputs = [(n_outputs*effort_of_output(candidates(i)%method, motion%dynamics), i=1, size(candidates))]
          expected = expected_efforts(motion%dynamics, options, rates, ratio, span, available)
@@ -81,9 +74,9 @@ contains
          best = minloc(expected + outputs(:n_even), dim=1)
          if (needs_no_trial(any(available), expected(best), outputs(best), ratio, options%rtol, rates)) then
             expected = expected + outputs(:n_even)
-            if (expected(1)/merge(1.0_wp, even_lead, vibrating(rates, span) < 1.0_wp) <= expected(2)) return ! that may be huge
-            choice%method = 'gauss'
-            choice%steps = expected_steps('gauss', options, rates, span)
+            if (expected(explicit)/merge(1.0_wp, even_lead, vibrating(rates, span) < 1.0_wp) <= expected(collocation)) return
+            call take(choice, collocation)
+            choice%steps = expected_steps(collocation, options, rates, span)
             return
          end if
          call try_methods(motion, y, t, options, minval([t_end, pack(motion%switches, motion%switches > t)]), t_end, rates, &
@@ -97,10 +90,18 @@ contains
       forecast(:n_even) = forecast(:n_even)/wanted
       best = minloc(forecast, dim=1)
       choice%tried = .true.
-      choice%method = trim(candidates(best)%method)
-      choice%options%order = candidates(best)%order
-      choice%advantage = min(forecast(1)*wanted/forecast(best), 1.0e9_wp)
+      call take(choice, best)
+      choice%advantage = min(forecast(explicit)*wanted/forecast(best), 1.0e9_wp)
    end subroutine choose_method
+
+   !> Choose a candidate.
+   pure subroutine take(choice, candidate)
+      type(method_choice), intent(inout) :: choice
+      integer, intent(in) :: candidate
+      choice%candidate = candidate
+      choice%method = trim(candidates(candidate)%method)
+      choice%options%order = candidates(candidate)%order
+   end subroutine take
 
    !> The method that the case names.
    function named_method(method, options) result(choice)
@@ -121,9 +122,9 @@ contains
       text = 'auto: no vibrations'
       if (self%rates%frequency > 0.0_wp) text = 'auto: frequencies to '//short(self%rates%frequency)//' rad/s'
       if (self%rates%decay > 0.0_wp) text = text//', dampers to '//short(self%rates%decay)//' 1/s'
-      if (self%method == 'dop853') then
+      if (self%candidate == explicit) then
          text = text//': explicit, order 8, about '//whole(self%steps)//' steps'
-      else if (self%method == 'gauss') then
+      else if (self%candidate == collocation) then
          text = text//': collocation, order 16, '
          if (self%tried) text = text//'in a trial the fastest'
          if (.not. self%tried) text = text//'about '//whole(self%steps)//' steps'
@@ -146,82 +147,17 @@ contains
       if (.not. available) return
       needs_no_trial = expected + output < short_run .or. .not. rates%slow > 0.0_wp
       if (needs_no_trial) return
-      needs_no_trial = ratio*(1.0_wp + output/expected) < stiff_from(rtol, rates)
+      needs_no_trial = ratio*(1.0_wp + output/expected) < stiff_ratio(rtol, rates)
    end function needs_no_trial
 
    !> Ratio of the fastest rate to the highest frequency of the chain from where implicit steps may pay. They need not follow
    !> vibrations below the tolerance, but the motion of the chain, with steps that shrink as the tolerance does.
-   pure real(wp) function stiff_from(rtol, rates)
+   pure real(wp) function stiff_ratio(rtol, rates)
       real(wp), intent(in) :: rtol
       type(fast_rates), intent(in) :: rates
-      stiff_from = merge(6.0_wp, 40.0_wp, rates%decay > 2.0_wp*rates%frequency)*(1.0e-3_wp/rtol)**0.25_wp
-   end function stiff_from
-
-   !> Efforts of explicit steps of order 8 and of collocation, by their steps (docs/performance.md). What the fast vibrations add
-   !> to the motion of the chain is nearly linear, so the faster they are, the fewer iterations a step of collocation needs.
-   !> It is out of the question (huge) where it has no lanes or modes, hinges may have events, or nothing vibrates.
-   function expected_efforts(dynamics, options, rates, ratio, t_end, available) result(effort)
-      type(dynamics_type), intent(in) :: dynamics
-      type(solver_options), intent(in) :: options
-      type(fast_rates), intent(in) :: rates
-      real(wp), intent(in) :: ratio !! fastest rate over the frequencies of the chain; 1: unknown, or rods are rigid
-      real(wp), intent(in) :: t_end !! length of the run [s]
-      logical, intent(in) :: available(n_even)
-      real(wp) :: effort(n_even)
-      real(wp) :: iterations
-
-      effort = huge(1.0_wp)
-      if (available(1)) effort(1) = explicit_step*expected_steps('dop853', options, rates, t_end)
-      if (.not. available(2) .or. dynamics%scene%assembled .or. dynamics%scene%n_dof > most_dof) return
-      if (.not. rates%frequency > 0.0_wp) return
-      iterations = 4.5_wp
-      if (ratio > 1.0_wp) iterations = max(1.2_wp, 8.0_wp*ratio**(-0.2_wp))
-      if (vibrating(rates, t_end) < 1.0_wp) iterations = damped_iterations(rates, options%rtol)
-      effort(2) = (effort_of_step(dynamics) + iterations*effort_of_nodes(dynamics))*expected_steps('gauss', options, rates, t_end)
-      if (rates%decay > coupling_decay*rates%frequency) effort(2) = effort(2)*(1.0_wp + effort_of_coupling(dynamics))
-      effort(2) = effort(2) + effort_of_modes(dynamics, merge(4, 2, vibrating(rates, t_end) < 1.0_wp))
-   end function expected_efforts
-
-   !> Iterations of a collocation step where dampers calm the vibrations, which allows longer steps: a fit to 190 measured scenes,
-   !> mostly right to a quarter.
-   pure real(wp) function damped_iterations(rates, rtol)
-      type(fast_rates), intent(in) :: rates
-      real(wp), intent(in) :: rtol
-      real(wp) :: ratio !! fastest frequency over those of the chain
-      ratio = 1.0_wp
-      if (rates%slow > 0.0_wp) ratio = rates%frequency/rates%slow
-      damped_iterations = min(9.0_wp, max(1.0_wp, 11.0_wp*ratio**(-0.21_wp)*(1.0e6_wp*rtol)**(-0.05_wp)))
-   end function damped_iterations
-
-   !> Steps of a run by a method that follows vibrations: of so many radians of the fastest, while it lasts; later as many as
-   !> stability or the motion of the chain allow.
-   pure real(wp) function expected_steps(method, options, rates, t_end) result(steps)
-      character(len=*), intent(in) :: method
-      type(solver_options), intent(in) :: options
-      type(fast_rates), intent(in) :: rates
-      real(wp), intent(in) :: t_end
-      real(wp) :: phase, later, share
-
-      share = vibrating(rates, t_end)
-      if (method == 'gauss') then
-         phase = 8.0_wp*min(1.0_wp, (1.0e4_wp*options%rtol)**0.0625_wp)
-         later = merge(12.0_wp, 18.0_wp, rates%decay > 10.0_wp*rates%frequency)
-      else
-         phase = 2.6_wp*min(1.0_wp, (1.0e4_wp*options%rtol)**0.125_wp)
-         later = 5.5_wp
-         if (rates%strongly_damped()) share = min(1.0_wp, share*(1.0e-3_wp/options%rtol)**0.08_wp) ! what dies out is seen longer
-      end if
-      steps = rates%frequency*t_end*(share/phase + (1.0_wp - share)/later)
-      if (method == 'dop853') steps = max(steps, rates%decay*t_end/stability_limit)
-   end function expected_steps
-
-   !> Share of a run in which fast vibrations last: dampers leave them below tolerance after some time.
-   pure real(wp) function vibrating(rates, t_end)
-      type(fast_rates), intent(in) :: rates
-      real(wp), intent(in) :: t_end
-      vibrating = 1.0_wp
-      if (rates%decay*t_end > lasting) vibrating = lasting/(rates%decay*t_end)
-   end function vibrating
+      stiff_ratio = merge(stiff_damped_from, stiff_from, rates%decay > mostly_damped*rates%frequency) &
+                    *(1.0e-3_wp/rtol)**stiff_power
+   end function stiff_ratio
 
    !> Three digits.
    function short(value) result(text)

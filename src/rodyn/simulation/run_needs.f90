@@ -3,6 +3,7 @@ module rodyn_run_needs
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: case_config
    use rodyn_errors, only: error_type, raise, exit_bad_input
+   use rodyn_method_costs, only: bytes_per_rod
    use rodyn_posix, only: parent_directory
    use rodyn_quantities, only: numbers_that_change
    use rodyn_resources, only: free_disk, free_memory, byte_text
@@ -13,6 +14,7 @@ module rodyn_run_needs
 
    real(wp), parameter :: word = 8.0_wp                !! of a real number [bytes]
    real(wp), parameter :: matrices = 4.75_wp           !! n_dof x n_dof, of the assembled kernel
+   real(wp), parameter :: less_bending = 0.4_wp        !! memory of rods that do not bend as motion over that of those that do
    !> Whatever the scene; OpenBLAS takes 134 MB at its first call, and without them would wait for ever [bytes].
    real(wp), parameter :: of_program = 1.5e8_wp
    real(wp), parameter :: least_compressed = 0.7_wp    !! of the size of numbers that change
@@ -55,22 +57,8 @@ contains
 
       n = real(config%chain%n_rods, wp)
       n_dof = n*merge(1.0_wp + config%model%bending_shapes, 1.0_wp, config%model%bending == 'dynamic')
-      memory_of_scene = n*bytes_per_rod(config)
+      memory_of_scene = n*bytes_per_rod(config%solver%method)*merge(1.0_wp, less_bending, config%model%bending == 'dynamic')
       if (config%model%kernel == 'assembled') memory_of_scene = memory_of_scene + word*matrices*n_dof**2
    end function memory_of_scene
-
-   !> What grows with n, by method, of 20,000 and 100,000 rods; `auto` is taken for the least of those it may choose.
-   pure real(wp) function bytes_per_rod(config)
-      type(case_config), intent(in) :: config
-      select case (config%solver%method)
-      case ('gauss')
-         bytes_per_rod = 4400.0_wp
-      case ('bdf')
-         bytes_per_rod = 2200.0_wp
-      case default
-         bytes_per_rod = 1800.0_wp
-      end select
-      if (config%model%bending /= 'dynamic') bytes_per_rod = 0.4_wp*bytes_per_rod
-   end function bytes_per_rod
 
 end module rodyn_run_needs
