@@ -31,7 +31,7 @@ contains
       text = fortran_compiler()
    end function compiler
 
-   !> Options this file was compiled with, and so, by fpm, all files.
+   !> Options this file was compiled with, and so were all files.
    pure function compiler_options() result(text)
       character(len=:), allocatable :: text
       text = fortran_options()

@@ -1,0 +1,63 @@
+"""Print what each file of a build is made from, for ninja (tools/compile).
+
+    python tools/write_ninja.py STAGE COMPILER FLAGS LIBRARIES
+
+A file is compiled after those whose modules it uses. gfortran leaves a module file alone if what the module offers is still the
+same; then nothing that uses it is compiled again. The code of tests is not optimised: that would take longer than to run it.
+"""
+
+from __future__ import annotations
+
+import pathlib
+import re
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+MODULE = re.compile(r"^ *module +(?!procedure\b|subroutine\b|function\b)(\w+)", re.MULTILINE | re.IGNORECASE)
+USE = re.compile(r"^ *use\b(?: *, *non_intrinsic)?[ :]*(\w+)", re.MULTILINE | re.IGNORECASE)
+INCLUDE = re.compile(r"^ *include '(.*)'", re.MULTILINE)
+RULES = """\
+builddir = {stage}
+rule compile
+  command = {compiler} {flags} $more -I{stage}/include -J$modules -c $in -o $out
+  description = $in
+  restat = 1
+rule archive
+  command = rm -f $out && ar rcs $out $in
+  description = $out
+rule link
+  command = {compiler} {flags} -o $out $in {libraries}
+  description = $out
+"""
+PROGRAMS = {"app/main.F90": "bin/rodyn", "test/main.f90": "test/tester", "test/sample_run.f90": "test/sample_run"}
+ARCHIVES = {"src": "lib/librodyn.a", "test": "objects/libtest.a"}
+
+
+def main() -> None:
+    """Read the source files, and print."""
+    stage, compiler, flags, libraries = sys.argv[1:]
+    print(RULES.format(stage=stage, compiler=compiler, flags=flags, libraries=libraries))
+    paths = [path for pattern in ("src/**/*.f90", "app/*.F90", "test/*.f90") for path in sorted(ROOT.glob(pattern))]
+    texts = {path.relative_to(ROOT): path.read_text() for path in paths}
+    modules_of = {"src": f"{stage}/include", "app": f"{stage}/include", "test": f"{stage}/objects"}
+    module_file = {name: f"{modules_of[path.parts[0]]}/{name}.mod" for path, text in texts.items() for name in MODULE.findall(text)}
+    members: dict[str, list[str]] = {folder: [] for folder in ARCHIVES}
+    for path, text in texts.items():
+        folder = path.parts[0]
+        made = f"{stage}/objects/{'_'.join(path.parts)}.o"
+        offered = [module_file[name] for name in MODULE.findall(text)]
+        needed = [module_file[name] for name in sorted(set(USE.findall(text))) if name in module_file]
+        needed += [str(path.parent / name) for name in INCLUDE.findall(text)]
+        print(f"build {made}{' | ' * bool(offered)}{' '.join(offered)}: compile {path} | {' '.join(needed)}")
+        print(f"  modules = {modules_of[folder]}")
+        print("  more = -O0" * (folder == "test"))
+        if str(path) in PROGRAMS:
+            archives = [ARCHIVES[other] for other in ("test", "src") if other in (folder, "src")]
+            print(f"build {stage}/{PROGRAMS[str(path)]}: link {made} {' '.join(f'{stage}/{archive}' for archive in archives)}")
+        else:
+            members[folder].append(made)
+    for folder, objects in members.items():
+        print(f"build {stage}/{ARCHIVES[folder]}: archive {' '.join(objects)}")
+
+
+main()
