@@ -18,6 +18,7 @@ import time
 import h5py
 import numpy as np
 import pytest
+import result_files
 import xarray
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -268,9 +269,9 @@ def test_a_rod_that_bends_too_far_ends_with_a_warning(tmp_path):
         result = rodyn("run", case.name, "--force", cwd=tmp_path)
         assert result.returncode == 0
         assert ("rod 2 bends by" in printed(result.stdout).get("warning", "")) is warned
-        with xarray.open_dataset(tmp_path / "case.h5") as run:
-            assert ("rod 2 bends by" in run.attrs["warnings"]) is warned
-            assert run.attrs["status"] == "done"
+        run = result_files.read(tmp_path / "case.h5")
+        assert ("rod 2 bends by" in run.attrs["warnings"]) is warned
+        assert run.attrs["status"] == "done"
 
 
 @pytest.mark.parametrize("text", [
@@ -509,8 +510,7 @@ def test_a_loss_of_rounding_is_none(tmp_path):
         """)
     result = rodyn("run", "case.nml", cwd=tmp_path)
     printed = [float(line.split(", ")[-1].split()[0]) for line in result.stdout.splitlines() if line.startswith("event ")]
-    with xarray.open_dataset(tmp_path / "case.h5", group="events") as events:
-        lost = events.energy_lost.values
+    lost = result_files.read(tmp_path / "case.h5", "events").energy_lost.values
     tiny = np.abs(lost) < 1e-15
     assert np.any(lost[tiny] < 0) and not np.any(np.array(printed)[tiny])
     np.testing.assert_allclose(np.array(printed)[~tiny], lost[~tiny], rtol=1e-3)
@@ -705,13 +705,11 @@ def test_the_formulation_of_the_article_is_noted_where_it_matters(results, tmp_p
     path, text = results["paper, bdf, assembled"]
     assert f"note    {words}" in text
     assert "note    method 'bdf': its errors add up" in text
-    with xarray.open_dataset(path) as run:
-        assert words in run.attrs["notes"]
+    assert words in result_files.read(path).attrs["notes"]
     for scene in ("flexible", "lumped", "no ledger"):
         path, text = results[scene]
         assert "note" not in printed(text)
-        with xarray.open_dataset(path) as run:
-            assert run.attrs["notes"] == ""
+        assert result_files.read(path).attrs["notes"] == ""
     # Without deflections or without energies there is nothing to note.
     for number, text in enumerate([CHAIN + "&model formulation = 'paper', bending = 'rigid' /\n", CHAIN + PAPER + NO_LEDGER]):
         case = write_case(tmp_path, TIMES + SPACECRAFT + text, f"{number}.nml")
@@ -752,8 +750,7 @@ def test_what_quasistatic_bending_leaves_out_is_noted(results, tmp_path):
 
 def rows_until_failure(path: pathlib.Path, n_intervals: int, t_end: float) -> xarray.Dataset:
     """The readable file of a failed run: all rows that were reached, all finite."""
-    with xarray.open_dataset(path) as run:
-        run.load()
+    run = result_files.read(path)
     assert run.attrs["status"] == "failed"
     assert run.attrs["message"]
     assert 1 <= run.sizes["time"] <= n_intervals

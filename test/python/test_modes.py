@@ -23,13 +23,13 @@ def modes_of(directory: pathlib.Path, text: str, *options: str) -> xarray.Datase
     write_case(directory, text)
     result = rodyn("modes", "case.nml", "--force", *options, cwd=directory)
     assert result.returncode == 0, result.stderr
-    with xarray.open_dataset(directory / "case_modes.h5") as data:
-        return data.load()
+    return result_files.read(directory / "case_modes.h5")
 
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_every_scene_has_a_file_that_explains_itself(scene, tmp_path):
     data = modes_of(tmp_path, SCENES[scene])
+    xarray.testing.assert_identical(data, xarray.load_dataset(tmp_path / "case_modes.h5"))
     for name, variable in data.variables.items():
         assert "long_name" in variable.attrs, name
         assert "units" in variable.attrs or variable.dtype.kind in "OUT", name

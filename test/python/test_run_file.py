@@ -1,7 +1,7 @@
 """A run file opens with xarray and h5py without arguments and holds what is promised.
 
 RODYN_RUN_FILE=path    test this file; otherwise one is made by the program `sample_run` of the Fortran tests.
-RODYN_SAMPLE_RUN=path  that program (`fpm test` builds it); otherwise the newest below build/.
+RODYN_SAMPLE_RUN=path  that program (`tools/build --test` makes it); otherwise the newest below build/.
 """
 
 import os
@@ -14,6 +14,7 @@ import time
 import h5py
 import numpy as np
 import pytest
+import result_files
 import xarray
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -42,7 +43,7 @@ def sample_run_program():
         return os.environ["RODYN_SAMPLE_RUN"]
     programs = sorted(ROOT.glob("build/*/test/sample_run"), key=lambda p: p.stat().st_mtime)
     if not programs:
-        pytest.skip("sample_run is not built: run fpm test")
+        pytest.skip("sample_run is not built: call tools/build --test")
     return str(programs[-1])
 
 
@@ -66,6 +67,11 @@ def test_xarray_sees_dimensions_and_coordinates(run_path):
         assert run.time.dtype == np.float64  # not a date
         assert run.time.units == "s"
         assert np.all(np.diff(run.time) > 0)
+
+
+def test_the_reader_of_the_tests_reads_what_xarray_does(run_path):
+    for group in ("/", "solver"):
+        xarray.testing.assert_identical(result_files.read(run_path, group), xarray.load_dataset(run_path, group=group))
 
 
 def test_xarray_sees_states_with_units(run_path):
@@ -151,12 +157,12 @@ def test_a_full_disk_ends_with_a_message_and_the_rows_until_then(tmp_path, limit
     assert [p.name for p in tmp_path.iterdir()] == ["full.h5"]
     whole = tmp_path / "whole.h5"
     subprocess.run([sample_run_program(), str(whole), str(n_rods), "1001"], check=True)
-    with xarray.open_dataset(path) as rows, xarray.open_dataset(whole) as all_rows:
-        n = rows.sizes["time"]
-        assert 0 < n < 1001
-        assert (rows.attrs["status"], rows.attrs["t_reached"]) == ("failed", rows.time[-1])
-        assert "File too large" in rows.attrs["message"]
-        assert rows.equals(all_rows.isel(time=slice(n)))
+    rows, all_rows = result_files.read(path), result_files.read(whole)
+    n = rows.sizes["time"]
+    assert 0 < n < 1001
+    assert (rows.attrs["status"], rows.attrs["t_reached"]) == ("failed", rows.time[-1])
+    assert "File too large" in rows.attrs["message"]
+    assert rows.equals(all_rows.isel(time=slice(n)))
 
 
 def test_a_killed_run_leaves_only_its_temporary_name(tmp_path):

@@ -17,6 +17,7 @@ import time
 import h5py
 import numpy as np
 import pytest
+import result_files
 import xarray
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -56,8 +57,7 @@ def sweep(here: pathlib.Path, text: str | None, *options: str, name: str = "s", 
 
 
 def opened(here: pathlib.Path, name: str = "s") -> xarray.Dataset:
-    with xarray.open_dataset(here / name / "sweep.h5") as data:
-        return data.load()
+    return result_files.read(here / name / "sweep.h5")
 
 
 def single(here: pathlib.Path, *changes: tuple[str, str]) -> xarray.Dataset:
@@ -68,13 +68,13 @@ def single(here: pathlib.Path, *changes: tuple[str, str]) -> xarray.Dataset:
         text = text.replace(old, new)
     (here / "one.nml").write_text(text)
     subprocess.run([RODYN, "run", "one.nml", "--force", "--quiet"], cwd=here, check=True)
-    with xarray.open_dataset(here / "one.h5") as data:
-        return data.load()
+    return result_files.read(here / "one.h5")
 
 
 def test_a_grid_is_the_same_as_single_runs(here):
     sweep(here, GRID)
     data = opened(here)
+    xarray.testing.assert_identical(data, xarray.load_dataset(here / "s" / "sweep.h5"))
     assert dict(data.sizes) == {"case": 6, "probe_time": 2, "rod": 3}
     assert list(data.param_mass_ratio) == [2, 2, 4, 4, 8, 8]
     assert list(data["param_model.inertia"]) == ["distributed", "lumped"] * 3
@@ -139,9 +139,9 @@ def test_keys_of_repeated_groups_are_axes(here, key, values, old, new):
     subprocess.run([RODYN, "run", "one.nml", "--quiet"], cwd=here, check=True)
     data = opened(here)
     assert list(data[f"param_{key}"]) == [float(value) for value in values.split(",")]
-    with xarray.open_dataset(here / "one.h5") as run:
-        np.testing.assert_allclose(data.final_phi[1], run.phi[-1], rtol=0, atol=1e-12)
-        assert np.abs(data.final_phi[0] - run.phi[-1]).max() > 1e-4
+    run = result_files.read(here / "one.h5")
+    np.testing.assert_allclose(data.final_phi[1], run.phi[-1], rtol=0, atol=1e-12)
+    assert np.abs(data.final_phi[0] - run.phi[-1]).max() > 1e-4
     with open_sweep(here / "s" / "sweep.h5") as read:
         assert list(read.axes) == [key] and key.split("(")[0] in read.axis_label(key)
 
@@ -473,8 +473,7 @@ def modes(here: pathlib.Path, *changes: tuple[str, str]) -> xarray.Dataset:
         text = text.replace(old, new)
     (here / "one.nml").write_text(text)
     subprocess.run([RODYN, "modes", "one.nml", "--force", "--quiet"], cwd=here, check=True)
-    with xarray.open_dataset(here / "one_modes.h5") as data:
-        return data.load()
+    return result_files.read(here / "one_modes.h5")
 
 
 def test_frequencies_are_those_of_rodyn_modes_beside_the_states(here):
@@ -526,13 +525,13 @@ def test_frequencies_at_equilibria_are_those_of_rodyn_modes(here):
     for case, value in enumerate((-10, 30)):
         (here / "one.nml").write_text(base.replace("-10", str(value)))
         subprocess.run([RODYN, "modes", "one.nml", "--equilibrium", "--force", "--quiet"], cwd=here, check=True)
-        with xarray.open_dataset(here / "one_modes.h5") as found:
-            np.testing.assert_allclose(data.frequency[case, 0], found.frequency[0], rtol=1e-12)
-            # One rod of length 2 and J = 1.5 8/3 on C = 40 with X, Y at its end: J w^2 = C + 2 (X cos phi + Y sin phi).
-            phi = float(found.state.sel(coordinate="phi_1"))
-            assert abs(40 * phi - 2 * (20 * math.cos(phi) - value * math.sin(phi))) < 1e-9
-            stiffness = 40 + 2 * (value * math.cos(phi) + 20 * math.sin(phi))
-            np.testing.assert_allclose(found.frequency[0], math.sqrt(stiffness / 4), rtol=1e-10)
+        found = result_files.read(here / "one_modes.h5")
+        np.testing.assert_allclose(data.frequency[case, 0], found.frequency[0], rtol=1e-12)
+        # One rod of length 2 and J = 1.5 8/3 on C = 40 with X, Y at its end: J w^2 = C + 2 (X cos phi + Y sin phi).
+        phi = float(found.state.sel(coordinate="phi_1"))
+        assert abs(40 * phi - 2 * (20 * math.cos(phi) - value * math.sin(phi))) < 1e-9
+        stiffness = 40 + 2 * (value * math.cos(phi) + 20 * math.sin(phi))
+        np.testing.assert_allclose(found.frequency[0], math.sqrt(stiffness / 4), rtol=1e-10)
     failed = sweep(here, text.format("&axis key = 'load(1).law', text_values = 'constant', 'smooth_step'"), name="t", code=1)
     assert list(opened(here, "t").status) == ["done", "failed"] and failed.returncode == 1
     assert "a load or a kink varies in time" in str(opened(here, "t").message.values[1])
@@ -950,7 +949,6 @@ def test_shipped_sweeps_are_valid():
 def test_exact_and_lumped_approach_each_other(tmp_path):
     subprocess.run([RODYN, "sweep", str(ROOT / "cases" / "sweep_table3.nml"), "--output", str(tmp_path / "t")], check=True,
                    capture_output=True)
-    with xarray.open_dataset(tmp_path / "t" / "sweep.h5") as data:
-        phi = data.phi.values[:, 0]
+    phi = result_files.read(tmp_path / "t" / "sweep.h5").phi.values[:, 0]
     difference = np.abs(phi[0::2] - phi[1::2]).max(axis=1)
     assert difference[-1] < 0.3 * difference[0] and math.isfinite(difference.sum())
