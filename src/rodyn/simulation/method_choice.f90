@@ -28,7 +28,7 @@ module rodyn_method_choice
       logical :: automatic = .false.          !! `auto` chose
       logical :: tried = .false.              !! after a trial
       logical :: conclusive = .true.          !! otherwise the trial was too short, and this is what is safe
-      real(wp) :: effort = 0.0_wp             !! of the trial, in right-hand sides
+      real(wp) :: effort = 0.0_wp             !! of the trial
       real(wp) :: pace = 0.0_wp               !! of the best even method, expected: time for an effort of 1 [s]
       type(fast_rates) :: rates               !! of the scene
       real(wp) :: steps = 0.0_wp              !! forecast
