@@ -402,7 +402,7 @@ contains
          if (self%hinges%driven) then
             call self%move_kinks(t(i))
             do k = 0, self%scene%n - 1
-               self%group%kink_moment(i, k) = self%hinges%offset(k)
+               self%group%offset(i, k) = self%hinges%offset(k)
             end do
          end if
          self%group%base_force(i, :) = self%forces%base

@@ -12,7 +12,7 @@ module rodyn_fastest_rates
    use rodyn_scene, only: scene_type
    use rodyn_hinge_law, only: hinge_law
    use rodyn_bending_matrices, only: bending_matrices
-   use rodyn_rod_integrals, only: rod_integrals
+   use rodyn_rod_constants, only: stiffen
    use rodyn_accelerations, only: dynamics_type, new_dynamics
    implicit none (type, external)
    private
@@ -81,11 +81,7 @@ contains
       rigid%n_q = rigid%n_dof
       do j = 1, size(rigid%rods)
          rigid%bending(j) = bending_matrices()
-         associate (rod => rigid%rods(j), i => scene%rods(j)%inertia)
-            rod%inertia = rod_integrals(m0=i%m0, m1=i%m1, m2=i%m2)
-            rod%central = i%m0*i%m2 - i%m1**2
-            rod%outer = i%m2 - 2.0_wp*rod%length*i%m1 + rod%length**2*i%m0
-         end associate
+         call stiffen(rigid%rods(j))
       end do
    end function with_rigid_rods
 

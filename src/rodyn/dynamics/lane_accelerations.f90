@@ -43,7 +43,7 @@ contains
          call sine_cosine(lanes*n, q(:, b + 1:b + n), work%sine(:, 1:), work%cosine(:, 1:))
          if (group%flexible) then
             call lane_flexible_accelerations(n, b, group%rods, group%rod_of, group%node_mass, group%stiffness, group%damping, &
-                                             group%kink_moment, group%mass, group%inertia, group%hinge_x, group%hinge_y, &
+                                             group%offset, group%mass, group%inertia, group%hinge_x, group%hinge_y, &
                                              group%base_force, group%loaded, group%node_force, work%sine, work%cosine, &
                                              q(:, b + 1:b + n), q(:, b + n + 1:b + 2*n), q(:, b + 2*n + 1:b + 3*n), p, &
                                              work%outward, acceleration, ok)
@@ -53,7 +53,7 @@ contains
             call lane_series_moments(n, group%damped, group%stiffness, group%damping, group%kink, group%lower, group%pivot, &
                                      group%upper, q(:, b + 1:b + n), p(:, b + 1:b + n), work%theta, work%moment)
          else
-            call lane_rigid_moments(n, group%stiffness, group%damping, group%kink_moment, q(:, b + 1:b + n), &
+            call lane_rigid_moments(n, group%stiffness, group%damping, group%offset, q(:, b + 1:b + n), &
                                     p(:, b + 1:b + n), work%moment)
          end if
          call lane_rigid_accelerations(n, b, group%rods, group%rod_of, group%node_mass, group%mass, group%inertia, &

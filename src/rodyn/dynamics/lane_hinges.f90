@@ -10,21 +10,21 @@ module rodyn_lane_hinges
 contains
 
    !> T = C (opening - gamma) + D opening' between rigid rods.
-   pure subroutine lane_rigid_moments(n, stiffness, damping, kink_moment, phi, phi_rate, moment)
+   pure subroutine lane_rigid_moments(n, stiffness, damping, offset, phi, phi_rate, moment)
       integer, intent(in) :: n !! rods
-      real(wp), dimension(lanes, 0:n - 1), intent(in) :: stiffness, damping, kink_moment !! C, D, C gamma
+      real(wp), dimension(lanes, 0:n - 1), intent(in) :: stiffness, damping, offset !! C, D, moment at rest
       real(wp), dimension(lanes, n), intent(in) :: phi, phi_rate !! [rad], [rad/s]
       real(wp), intent(out) :: moment(lanes, 0:n) !! T, T(n) = 0 [N m]
       integer :: k, i
 
       !$omp simd
       do i = 1, lanes
-         moment(i, 0) = (stiffness(i, 0)*phi(i, 1) - kink_moment(i, 0)) + damping(i, 0)*phi_rate(i, 1)
+         moment(i, 0) = (stiffness(i, 0)*phi(i, 1) - offset(i, 0)) + damping(i, 0)*phi_rate(i, 1)
       end do
       do k = 1, n - 1
          !$omp simd
          do i = 1, lanes
-            moment(i, k) = (stiffness(i, k)*(phi(i, k + 1) - phi(i, k)) - kink_moment(i, k)) + &
+            moment(i, k) = (stiffness(i, k)*(phi(i, k + 1) - phi(i, k)) - offset(i, k)) + &
                            damping(i, k)*(phi_rate(i, k + 1) - phi_rate(i, k))
          end do
       end do

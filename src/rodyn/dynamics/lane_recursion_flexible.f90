@@ -22,14 +22,14 @@ module rodyn_lane_recursion_flexible
 contains
 
    !> p' in every lane.
-   subroutine lane_flexible_accelerations(n, n_base, rods, rod_of, node_mass, stiffness, damping, kink_moment, mass, inertia, &
+   subroutine lane_flexible_accelerations(n, n_base, rods, rod_of, node_mass, stiffness, damping, offset, mass, inertia, &
                                           hinge_x, hinge_y, base_force, loaded, node_force, sine, cosine, phi, alpha, beta, p, &
                                           outward, acceleration, ok)
       integer, intent(in) :: n, n_base           !! rods; 3 or 0 unknowns of the spacecraft
       type(lane_rod), intent(in) :: rods(*)      !! distinct rods
       integer, intent(in) :: rod_of(n)           !! which of them is rod k
       real(wp), intent(in) :: node_mass(lanes, 0:n) !! mu [kg]
-      real(wp), dimension(lanes, 0:n - 1), intent(in) :: stiffness, damping, kink_moment !! C, D, C gamma
+      real(wp), dimension(lanes, 0:n - 1), intent(in) :: stiffness, damping, offset !! C, D, moment at rest
       real(wp), dimension(lanes), intent(in) :: mass, inertia, hinge_x, hinge_y !! of the spacecraft
       real(wp), intent(in) :: base_force(lanes, 3) !! X_C, Y_C, M_C, moving axes
       logical, intent(in) :: loaded              !! node_force is to be used
@@ -105,7 +105,7 @@ contains
                before = share*(phi(i, j) + beta(i, j))
                before_rate = share*(p(i, ip + j) + p(i, ib + j))
                moment_in = stiffness(i, k - 1)*(opening - before) + damping(i, k - 1)*(opening_rate - before_rate) - &
-                           kink_moment(i, k - 1)
+                           offset(i, k - 1)
                moment_out = chain%moment(i)
                chain%moment(i) = moment_in
 
@@ -116,19 +116,19 @@ contains
                lw2 = rod%length(i)*w2
                mv = rod%a1(i)*alpha(i, k) + rod%b1(i)*beta(i, k)
                mv_rate = rod%a1(i)*p(i, ia + k) + rod%b1(i)*p(i, ib + k)
-               qa = rod%aa(i)*alpha(i, k) + rod%ab(i)*beta(i, k)
-               qb = rod%ab(i)*alpha(i, k) + rod%bb(i)*beta(i, k)
+               qa = rod%second(i, 1)*alpha(i, k) + rod%second(i, 2)*beta(i, k)
+               qb = rod%second(i, 2)*alpha(i, k) + rod%second(i, 3)*beta(i, k)
                mvv = alpha(i, k)*qa + beta(i, k)*qb
                mvv_rate = p(i, ia + k)*qa + p(i, ib + k)*qb
 
                ! Moments on the slopes.
-               qa = -moment_in - rod%k11(i)*(alpha(i, k) + rod%carry_out(i)*beta(i, k))
-               qb = moment_out - rod%k22(i)*(rod%carry_in(i)*alpha(i, k) + beta(i, k))
-               gq = rod%g1(i)*qa + rod%g2(i)*qb
-               hq = rod%h1(i)*qa + rod%h2(i)*qb
+               qa = -moment_in - rod%stiffness(i, 1)*(alpha(i, k) + rod%carry_over(i, 1)*beta(i, k))
+               qb = moment_out - rod%stiffness(i, 3)*(rod%carry_over(i, 2)*alpha(i, k) + beta(i, k))
+               gq = rod%g(i, 1)*qa + rod%g(i, 2)*qb
+               hq = rod%h(i, 1)*qa + rod%h(i, 2)*qb
                r0 = moment_out - moment_in - hq - w2*(rod%sa(i)*alpha(i, k) + rod%sb(i)*beta(i, k)) - w*mvv_rate
-               outward(i, of_alpha, k) = w2*alpha(i, k) + rod%b11(i)*qa + rod%b12(i)*qb
-               outward(i, of_beta, k) = w2*beta(i, k) + rod%b12(i)*qa + rod%b22(i)*qb
+               outward(i, of_alpha, k) = w2*alpha(i, k) + rod%b_inverse(i, 1)*qa + rod%b_inverse(i, 2)*qb
+               outward(i, of_beta, k) = w2*beta(i, k) + rod%b_inverse(i, 2)*qa + rod%b_inverse(i, 3)*qb
 
                ! `add_rod`. Row of W', and what follows from it for the outer node.
                cd = cosine(i, k)*cosine(i, k - 1) + sine(i, k)*sine(i, k - 1)
@@ -186,8 +186,8 @@ contains
                   across = outward(i, of_cosine, k)*an(i) - outward(i, of_sine, k)*ae(i)
                   w_rate = outward(i, of_turn, k) - outward(i, of_along, k)*along - outward(i, of_cross, k)*across
                   acceleration(i, ip + k) = w_rate - omega_rate(i)
-                  acceleration(i, ia + k) = outward(i, of_alpha, k) - rod%g1(i)*across - rod%h1(i)*w_rate
-                  acceleration(i, ib + k) = outward(i, of_beta, k) - rod%g2(i)*across - rod%h2(i)*w_rate
+                  acceleration(i, ia + k) = outward(i, of_alpha, k) - rod%g(i, 1)*across - rod%h(i, 1)*w_rate
+                  acceleration(i, ib + k) = outward(i, of_beta, k) - rod%g(i, 2)*across - rod%h(i, 2)*w_rate
                   an(i) = across + rod%length(i)*w_rate
                   ae(i) = along - outward(i, of_pull, k)
                end do

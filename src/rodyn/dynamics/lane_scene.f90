@@ -15,9 +15,10 @@ module rodyn_lane_scene
 
    !> What the recursion reads of a rod (`rodyn_rod_constants`).
    type :: lane_rod
-      real(wp), dimension(lanes) :: length, length_2, k11, k22, carry_out, carry_in, m0, m1, a1, b1, sa, sb, aa, ab, bb, b11, &
-                                    b12, b22, g1, g2, h1, h2, m0_reduced, m1_reduced, m2_reduced, central, length_m1, &
-                                    offset, outer
+      real(wp), dimension(lanes) :: length, length_2, m0, m1, a1, b1, sa, sb, m0_reduced, m1_reduced, m2_reduced, central, &
+                                    length_m1, offset, outer
+      real(wp), dimension(lanes, 2) :: carry_over, g, h
+      real(wp), dimension(lanes, 3) :: stiffness, second, b_inverse
    end type lane_rod
 
    !> A group of scenes.
@@ -35,7 +36,7 @@ module rodyn_lane_scene
       real(wp), allocatable :: stiffness(:, :) !! C (lanes, 0:n-1) [N m/rad]
       real(wp), allocatable :: damping(:, :)   !! D (lanes, 0:n-1) [N m s/rad]
       real(wp), allocatable :: kink(:, :)      !! gamma (lanes, 0:n-1) [rad]
-      real(wp), allocatable :: kink_moment(:, :) !! moment at rest with all openings zero (`rodyn_hinge_law`) (lanes, 0:n-1) [N m]
+      real(wp), allocatable :: offset(:, :)    !! moment at rest with all openings zero (`rodyn_hinge_law`) (lanes, 0:n-1) [N m]
       real(wp), allocatable, dimension(:, :) :: lower, pivot, upper !! factors of `rodyn_three_moments` (lanes, 0:n-1), if `series`
       real(wp), dimension(lanes) :: mass = 1.0_wp, inertia = 1.0_wp, hinge_x = 0.0_wp, hinge_y = 0.0_wp !! of the spacecraft
       real(wp), allocatable :: base_force(:, :)    !! X_C, Y_C, M_C (lanes, 3), moving axes
@@ -90,7 +91,7 @@ contains
             group%rod_of = scene%rod_of
          end if
          allocate (group%node_mass(lanes, 0:n), group%stiffness(lanes, 0:n - 1), group%damping(lanes, 0:n - 1), &
-                   group%kink(lanes, 0:n - 1), group%kink_moment(lanes, 0:n - 1), group%base_force(lanes, 3), &
+                   group%kink(lanes, 0:n - 1), group%offset(lanes, 0:n - 1), group%base_force(lanes, 3), &
                    group%node_force(lanes, 2, n), &
                    source=0.0_wp)
          if (group%series) allocate (group%lower(lanes, 0:n - 1), group%pivot(lanes, 0:n - 1), group%upper(lanes, 0:n - 1), &
@@ -116,7 +117,7 @@ contains
       group%stiffness(lane, :) = hinges%stiffness
       group%damping(lane, :) = hinges%damping
       group%kink(lane, :) = hinges%kink
-      group%kink_moment(lane, :) = hinges%offset
+      group%offset(lane, :) = hinges%offset
       group%mass(lane) = scene%body%mass
       group%inertia(lane) = scene%body%inertia
       group%hinge_x(lane) = scene%body%hinge_x
@@ -138,26 +139,12 @@ contains
 
       rods%length(lane) = rod%length
       rods%length_2(lane) = rod%length_2
-      rods%k11(lane) = rod%stiffness(1)
-      rods%k22(lane) = rod%stiffness(3)
-      rods%carry_out(lane) = rod%carry_over(1)
-      rods%carry_in(lane) = rod%carry_over(2)
       rods%m0(lane) = rod%inertia%m0
       rods%m1(lane) = rod%inertia%m1
       rods%a1(lane) = rod%inertia%a1
       rods%b1(lane) = rod%inertia%b1
       rods%sa(lane) = rod%inertia%sa
       rods%sb(lane) = rod%inertia%sb
-      rods%aa(lane) = rod%second(1)
-      rods%ab(lane) = rod%second(2)
-      rods%bb(lane) = rod%second(3)
-      rods%b11(lane) = rod%b_inverse(1)
-      rods%b12(lane) = rod%b_inverse(2)
-      rods%b22(lane) = rod%b_inverse(3)
-      rods%g1(lane) = rod%g(1)
-      rods%g2(lane) = rod%g(2)
-      rods%h1(lane) = rod%h(1)
-      rods%h2(lane) = rod%h(2)
       rods%m0_reduced(lane) = rod%m0_reduced
       rods%m1_reduced(lane) = rod%m1_reduced
       rods%m2_reduced(lane) = rod%m2_reduced
@@ -165,6 +152,12 @@ contains
       rods%length_m1(lane) = rod%length_m1
       rods%offset(lane) = rod%offset
       rods%outer(lane) = rod%outer
+      rods%carry_over(lane, :) = rod%carry_over
+      rods%g(lane, :) = rod%g
+      rods%h(lane, :) = rod%h
+      rods%stiffness(lane, :) = rod%stiffness
+      rods%second(lane, :) = rod%second
+      rods%b_inverse(lane, :) = rod%b_inverse
    end subroutine put_rod
 
 end module rodyn_lane_scene

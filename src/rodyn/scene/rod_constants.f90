@@ -7,7 +7,7 @@ module rodyn_rod_constants
    use rodyn_rod_profile, only: rod_profile
    implicit none (type, external)
    private
-   public :: rod_constants, new_rod_constants
+   public :: rod_constants, new_rod_constants, stiffen
 
    !> Integrals and what follows from them. With B = ((aa, ab), (ab, bb)) the constant block of alpha'', beta'',
    !>     g = B^-1 (a1, b1),   h = B^-1 (sa, sb),
@@ -63,19 +63,36 @@ contains
       if (flexible) then
          if (consistent) rod%second = [rod%inertia%aa, rod%inertia%ab, rod%inertia%bb]
          call reduce(rod, ok)
+         call join_chain(rod)
       else
-         associate (i => rod%inertia)
-            rod%inertia = rod_integrals(m0=i%m0, m1=i%m1, m2=i%m2)
-         end associate
-         rod%m0_reduced = rod%inertia%m0
-         rod%m1_reduced = rod%inertia%m1
-         rod%m2_reduced = rod%inertia%m2
+         call stiffen(rod)
       end if
-      rod%central = rod%m0_reduced*rod%m2_reduced - rod%m1_reduced**2
-      rod%length_m1 = length*rod%m1_reduced
-      rod%offset = length*rod%m0_reduced - rod%m1_reduced
-      rod%outer = rod%m2_reduced - 2.0_wp*length*rod%m1_reduced + length**2*rod%m0_reduced
    end subroutine new_rod_constants
+
+   !> A rod whose bending is no motion: nothing is to be eliminated from m0, m1, m2.
+   pure subroutine stiffen(rod)
+      type(rod_constants), intent(inout) :: rod
+
+      associate (i => rod%inertia)
+         rod%inertia = rod_integrals(m0=i%m0, m1=i%m1, m2=i%m2)
+      end associate
+      rod%m0_reduced = rod%inertia%m0
+      rod%m1_reduced = rod%inertia%m1
+      rod%m2_reduced = rod%inertia%m2
+      call join_chain(rod)
+   end subroutine stiffen
+
+   !> What the recursions make of the reduced inertias where the rod carries a chain.
+   pure subroutine join_chain(rod)
+      type(rod_constants), intent(inout) :: rod
+
+      associate (length => rod%length)
+         rod%central = rod%m0_reduced*rod%m2_reduced - rod%m1_reduced**2
+         rod%length_m1 = length*rod%m1_reduced
+         rod%offset = length*rod%m0_reduced - rod%m1_reduced
+         rod%outer = rod%m2_reduced - 2.0_wp*length*rod%m1_reduced + length**2*rod%m0_reduced
+      end associate
+   end subroutine join_chain
 
    !> Stiffness of the slopes, and flexibility where they have no inertia.
    pure subroutine resist_bending(rod, rule, flexible, ok, profile)
