@@ -135,6 +135,7 @@ module rodyn_case_config
    type :: output_config
       character(len=:), allocatable :: file !! path of the result; empty: named after the case
       logical :: ledger = .true.            !! energy and momentum along the run
+      logical :: loads = .false.            !! what hinges do along the run
       integer :: compression = 4            !! gzip level 0..9
    end type output_config
 
@@ -467,6 +468,7 @@ contains
       call visitor%text_field(output%file, key('file', rule=up_to, high=4096.0_wp, &
          help='path of the result; empty: named after the case file'))
       call visitor%field(output%ledger, key('ledger', help='record energies, work and momenta along the run'))
+      call visitor%field(output%loads, key('loads', help='record angles and rates of hinges along the run'))
       call visitor%field(output%compression, key('compression', rule=in_range, low=0.0_wp, high=9.0_wp, help='gzip level'))
       call visitor%close_group()
    end subroutine visit_output

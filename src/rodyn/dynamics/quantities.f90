@@ -35,8 +35,9 @@ module rodyn_quantities
       enumerator :: chain = 1, bending, spacecraft !! always there; zero if rods are rigid, if the spacecraft is fixed
       enumerator :: third_shape                    !! there with three bending shapes
       enumerator :: ledger                         !! there with the ledger
+      enumerator :: loads                          !! there if asked for
    end enum
-   integer, parameter :: n_parts = ledger
+   integer, parameter :: n_parts = loads
 
    type :: quantity
       character(len=20) :: name
@@ -111,6 +112,7 @@ contains
       has = .true.
       has(third_shape) = config%model%bending_shapes == 3
       has(ledger) = config%output%ledger
+      has(loads) = config%output%loads
       layout = new_layout(config%chain%n_rods, has)
    end function layout_of
 
@@ -195,7 +197,7 @@ contains
       is_finite = all(abs(row%values) <= huge(1.0_wp))
    end function is_finite
 
-   !> Read a row off the state y at time t, in the order of the table. The residual is
+   !> Read a row off the state y at time t, in the order of the table; kinks that move have been moved to t. The residual is
    !>     (kinetic + elastic + dissipated - work)(t) - (kinetic + elastic)(0),
    !> zero but for the integrator's error in a `consistent` scene, docs/model.md sec. 6.
    pure subroutine fill_row(motion, t, y, initial_energy, row)

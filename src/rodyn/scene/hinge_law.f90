@@ -20,8 +20,8 @@ module rodyn_hinge_law
    use rodyn_three_moments, only: three_moments, new_three_moments
    implicit none (type, external)
    private
-   public :: hinge_law, new_hinge_law, hinge_moments, hinge_state, hinge_rates, hinge_tangent, openings, relaxation_rates, &
-      relaxation_tangent, initial_joints, spring_energy, damper_power, relaxing_power
+   public :: hinge_law, new_hinge_law, hinge_moments, hinge_state, hinge_rates, hinge_tangent, joint_rotations, openings, &
+      relaxation_rates, relaxation_tangent, initial_joints, spring_energy, damper_power, relaxing_power
 
    !> Springs, dampers and kinks of hinges 0..n-1.
    type :: hinge_law
@@ -527,6 +527,26 @@ contains
       theta(law%held) = law%held_at
       call clear_at(law%held, theta_rate)
    end subroutine hinge_state
+
+   !> Joint rotations th and all their rates, for output.
+   pure subroutine joint_rotations(law, n, flexible, angle, angle_rate, theta, theta_rate)
+      type(hinge_law), intent(in) :: law
+      integer, intent(in) :: n
+      logical, intent(in) :: flexible
+      real(wp), intent(in) :: angle(*), angle_rate(*)
+      real(wp), intent(out) :: theta(0:n - 1)      !! th [rad]
+      real(wp), intent(out) :: theta_rate(0:n - 1) !! th' [rad/s]
+      real(wp) :: moment(0:n), moment_rate(0:n), rate(size(law%relaxing))
+
+      call hinge_state(law, n, flexible, angle, angle_rate, theta, theta_rate, moment, moment_rate)
+      if (size(law%relaxing) == 0) return
+      rate = theta_rate(law%relaxing)
+      call openings(n, flexible, angle_rate, theta_rate)
+      theta_rate = theta_rate - law%kink_rate
+      call moments_of_series(law, n, theta_rate, rate, moment)
+      theta_rate(law%relaxing) = rate
+      call clear_at(law%held, theta_rate)
+   end subroutine joint_rotations
 
    !> The same with relaxing hinges; on entry theta and theta_rate hold the openings from their kinks (and what constant
    !> moments bend), and their rates.

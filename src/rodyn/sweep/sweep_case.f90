@@ -358,7 +358,7 @@ contains
 
    !> Keep the state at the end of a case.
    subroutine keep_final(setup, keeper, error)
-      class(run_setup), intent(in) :: setup !! with the state at the end
+      class(run_setup), intent(inout) :: setup !! with the state at the end
       type(keeper_type), intent(inout) :: keeper
       type(error_type), allocatable, intent(out) :: error
 
@@ -366,6 +366,7 @@ contains
          call raise(error, 'the final state is not finite')
          return
       end if
+      call setup%motion%dynamics%move_kinks(setup%t_end)
       call fill_row(setup%motion, setup%t_end, setup%y, 0.0_wp, keeper%row)
       call keeper%validity%observe(keeper%row)
       keeper%kept%message = in_one_line(keeper%validity%warnings())
