@@ -5,6 +5,7 @@
 module rodyn_quantities
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: case_config
+   use rodyn_hinge_law, only: joint_rotations
    use rodyn_kinematics, only: invariants_type, invariants, slopes
    use rodyn_motion, only: motion_type
    implicit none (type, external)
@@ -70,7 +71,9 @@ module rodyn_quantities
       quantity('energy_residual', scalar, ledger, 'J', 'kinetic + elastic + dissipated - work - their start'), &
       quantity('momentum_x', scalar, ledger, 'kg m s-1', 'linear momentum, inertial x axis'), &
       quantity('momentum_y', scalar, ledger, 'kg m s-1', 'linear momentum, inertial y axis'), &
-      quantity('angular_momentum', scalar, ledger, 'kg m2 s-1', 'angular momentum about the inertial origin')]
+      quantity('angular_momentum', scalar, ledger, 'kg m2 s-1', 'angular momentum about the inertial origin'), &
+      quantity('hinge_angle', hinge, loads, 'rad', 'rotation of the hinge from its kink, which its spring feels'), &
+      quantity('hinge_rate', hinge, loads, 'rad s-1', 'rate of hinge_angle')]
 
    !> Which quantities a row has, and where.
    type :: row_layout
@@ -207,7 +210,7 @@ contains
       real(wp), intent(in) :: initial_energy  !! kinetic + elastic at t = 0 [J]; matters with the ledger
       type(row_type), intent(inout) :: row    !! of the same number of rods
       type(invariants_type) :: now
-      real(wp) :: slope(motion%dynamics%scene%n, 4)
+      real(wp) :: x(motion%dynamics%scene%n, 4) ! of each rod or hinge
       integer :: n, b, f
 
       associate (scene => motion%dynamics%scene, q => y(:motion%n_q), p => y(motion%n_q + 1:motion%n_q + motion%n_dof), &
@@ -217,13 +220,13 @@ contains
          f = merge(1, 0, motion%free)       ! and of each coordinate of the spacecraft
          row%time = t
          row%next = 1
-         call slopes(scene, motion%dynamics%hinges, q, p, slope(:, 1), slope(:, 2), slope(:, 3), slope(:, 4))
+         call slopes(scene, motion%dynamics%hinges, q, p, x(:, 1), x(:, 2), x(:, 3), x(:, 4))
          call put(row, 'phi', q(scene%phi_at() + 1:scene%phi_at() + n))
-         call put(row, 'alpha', slope(:, 1))
-         call put(row, 'beta', slope(:, 2))
+         call put(row, 'alpha', x(:, 1))
+         call put(row, 'beta', x(:, 2))
          call put(row, 'phi_rate', p(scene%phi_at() + 1:scene%phi_at() + n))
-         call put(row, 'alpha_rate', slope(:, 3))
-         call put(row, 'beta_rate', slope(:, 4))
+         call put(row, 'alpha_rate', x(:, 3))
+         call put(row, 'beta_rate', x(:, 4))
          call put(row, 'bubble', q(scene%bend_at(3) + 1:scene%bend_at(3) + b))
          call put(row, 'bubble_rate', p(scene%bend_at(3) + 1:scene%bend_at(3) + b))
          call put(row, 'velocity_x', p(1:f))
@@ -242,6 +245,12 @@ contains
             call put(row, 'momentum_x', now%momentum(1:1))
             call put(row, 'momentum_y', now%momentum(2:2))
             call put(row, 'angular_momentum', [now%angular_momentum])
+         end if
+         if (row%layout%has(loads)) then
+            call joint_rotations(motion%dynamics%hinges, n, scene%dynamic_bending, q(scene%n_base + 1:), p(scene%n_base + 1:), &
+                                 x(:, 1), x(:, 2))
+            call put(row, 'hinge_angle', x(:, 1))
+            call put(row, 'hinge_rate', x(:, 2))
          end if
       end associate
    end subroutine fill_row
