@@ -49,7 +49,8 @@ pre { background: #f6f6f6; padding: .8rem; overflow-x: auto; font-size: 12px; li
 MIME = {".svg": "image/svg+xml", ".png": "image/png", ".gif": "image/gif"}
 MOST_FAILURES = 200
 SOLVER_WORDS = {
-    "reason": "why this method", "n_steps": "steps", "n_rhs": "right-hand-side evaluations", "n_jac": "Jacobians", "wall_seconds": "wall time, s",
+    "reason": "why this method", "n_steps": "steps", "n_rhs": "right-hand-side evaluations", "n_jac": "Jacobians",
+    "wall_seconds": "wall time, s",
 }
 
 

@@ -217,7 +217,8 @@ def judged(run: Run, keys: dict, reference: Reference) -> dict:
             undetermined = reference.undetermined_from(FACTOR * float(f"{bound:.3g}"))
             differ = differ if differ < 0.999 * undetermined else 2.0 * reference.t_end
         keep = reference.motion.time[rows] <= until
-    return {"phi": float(phi[keep].max()), "energy": float(energy[keep].max()), "events": bool(differ <= min(until * 0.999999, reference.t_end)),
+    return {"phi": float(phi[keep].max()), "energy": float(energy[keep].max()),
+            "events": bool(differ <= min(until * 0.999999, reference.t_end)),
             "until": until if until <= reference.t_end else None, "differ": differ if differ <= reference.t_end else None}
 
 

@@ -19,7 +19,8 @@ from ordinary_scenes import Group
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
-SOURCES = [HERE / "multipliers" / f"{name}.f90" for name in ("scene_data", "joint_laws", "body_equations", "chain_motion", "chain_with_multipliers")]
+SOURCES = [HERE / "multipliers" / f"{name}.f90"
+           for name in ("scene_data", "joint_laws", "body_equations", "chain_motion", "chain_with_multipliers")]
 NONE = 1e300
 KINDS = ("released", "latched", "in_freeplay", "out_of_freeplay", "at_lower_stop", "off_lower_stop", "at_upper_stop", "off_upper_stop",
          "slides", "sticks")
@@ -73,7 +74,8 @@ def motion_of(text: str, n: int) -> Motion:
         elif word == "end":
             trouble, jumps, drift = " ".join(values[4:]), int(values[3]), float(values[2])
     a = np.array(rows)
-    names = [("phi", n), ("phi_rate", n), ("alpha", n), ("beta", n), ("base", 3), ("base_rate", 3), ("energy_kinetic", 1), ("energy_elastic", 1),
+    names = [("phi", n), ("phi_rate", n), ("alpha", n), ("beta", n), ("base", 3), ("base_rate", 3), ("energy_kinetic", 1),
+             ("energy_elastic", 1),
              ("energy_dissipated", 1), ("work_external", 1)]
     states, at = {}, 1
     for name, width in names:

@@ -169,7 +169,8 @@ def change_sizes(rng: random.Random, text: bytes) -> bytes:
             key = rng.choice([b"title", b"base", b"law", b"key", b"method"])
             return re.sub(key + rb"\s*=\s*'[^']*'", key + b" = '" + b"x" * rng.choice([1, 80, 81, 1000, 1001, 4097, 100_000]) + b"'", text)
         case _:
-            return text + rng.choice([MOMENT, SWEEPS[0], "&axis key = 'case.t_end', values = 0.01, 0.02 /\n"]).encode() * rng.choice([1, 9, 300])
+            group = rng.choice([MOMENT, SWEEPS[0], "&axis key = 'case.t_end', values = 0.01, 0.02 /\n"])
+            return text + group.encode() * rng.choice([1, 9, 300])
 
 
 MUTATIONS = {"bytes": change_bytes, "tokens": change_tokens, "numbers": change_number, "groups": change_groups, "sizes": change_sizes}

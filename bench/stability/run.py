@@ -108,7 +108,9 @@ def table(head: list[str], body: list[list[str]]) -> str:
 def short(text: str) -> str:
     """2.77E-003 as 2.8e-3."""
     value = float(text)
-    return "0" if value == 0 else "–" if not np.isfinite(value) or abs(value) > 1e300 else f"{value:.1e}".replace("e-0", "e-").replace("e+0", "e").replace("e+", "e")
+    if value == 0:
+        return "0"
+    return "–" if not np.isfinite(value) or abs(value) > 1e300 else f"{value:.1e}".replace("e-0", "e-").replace("e+0", "e").replace("e+", "e")
 
 
 def named(method: str, order: str) -> str:
@@ -176,7 +178,8 @@ def extremes_table() -> str:
 
 
 def article_table() -> str:
-    return table(["method", "rtol", "t_end, s", "1", "30", "60", "120", "240", "480", "momentum", "largest alpha' at end", "steps", "wall s", "status"],
+    return table(["method", "rtol", "t_end, s", "1", "30", "60", "120", "240", "480", "momentum",
+                  "largest alpha' at end", "steps", "wall s", "status"],
                  [[f"`{row[0]}`", *row[1:]] for row in rows("article")])
 
 

@@ -129,7 +129,8 @@ class Campaign:
         ended()
         self.tell(all(equal) and again == 0,
                   f"kill -9 at {killed} random times in {len(equal)} sweeps of 500 cases (in {sum(n > 0 for n in resumed_at)} "
-                  f"of them with results on the disk, {sum(resumed_at) // killed} on average), each resumed to its end: {sum(equal)} byte-equal, "
+                  f"of them with results on the disk, {sum(resumed_at) // killed} on average), "
+                  f"each resumed to its end: {sum(equal)} byte-equal, "
                   f"no case missing or doubled; {again} finished cases were integrated again")
 
     def rank_kills(self, times: int = 10) -> None:

@@ -240,7 +240,8 @@ class Benchmark:
         text, stem = pathlib.Path(base["scene"]).read_text(), pathlib.Path(base["scene"]).stem
         n = read_namelist(text)["chain"][0]["n_rods"]
         precision = "quadruple" if n <= 16 and stem not in ("stiff", "damped") else "extended"
-        candidates = [(f"heyoka in {precision} precision", "heyoka", {"method": "reference", "rtol": HEYOKA[precision], "precision": precision}),
+        candidates = [(f"heyoka in {precision} precision", "heyoka",
+                       {"method": "reference", "rtol": HEYOKA[precision], "precision": precision}),
                       ("other equations, extrapolated in quadruple precision", "other", {}),
                       ("dop853 in extended precision", "extended", {"method": "dop853", "rtol": 1e-18, "atol": 1e-18}),
                       ("Gragg's extrapolation in quadruple precision", "quadruple", {"method": "gragg", "rtol": 1e-17, "atol": 1e-19})]
@@ -378,7 +379,8 @@ class Benchmark:
                     self.figures.append(f"{name}/rodyn best, {scene}, at errors of {key.removeprefix('error_')} from {where[0]:.0e} to "
                                         f"{where[-1]:.0e} {unit}: {text} (geometric mean {geometric_mean(ratios):.2f})")
             adaptive = {line: times for line, times in table.items() if not line.fixed}
-            for name, shown in (("rodyn best", table), ("rodyn best adaptive", adaptive), ("heyoka", {k: v for k, v in table.items() if k.worker == "heyoka"})):
+            heyoka = {line: times for line, times in table.items() if line.worker == "heyoka"}
+            for name, shown in (("rodyn best", table), ("rodyn best adaptive", adaptive), ("heyoka", heyoka)):
                 worker = "heyoka" if name == "heyoka" else "rodyn"
                 best = [(target, *best_of(shown, worker, i)) for i, target in enumerate(TARGETS)]
                 text = ", ".join(f"{1e3 * seconds:.3g} ms ({line})" if worker == "rodyn" else f"{1e3 * seconds:.3g} ms"
@@ -428,8 +430,9 @@ class Benchmark:
         for target in (1e-4, 1e-6, 1e-8):
             times = {name: time_at([e for e, _ in points], [s for _, s in points], target) for name, points in curves.items()}
             batch = times.pop("heyoka batch", math.nan)
-            best = min((t, name) for name, t in times.items() if np.isfinite(t)) if np.isfinite(list(times.values())).any() else (math.nan, "none")
-            self.figures.append(f"heyoka batch cases per second per core, table1 varied, error of alpha_rate {target:.0e} rad/s: {8 / batch:.0f}; "
+            best = min(((t, name) for name, t in times.items() if np.isfinite(t)), default=(math.nan, "none"))
+            self.figures.append(f"heyoka batch cases per second per core, table1 varied, error of alpha_rate {target:.0e} rad/s: "
+                                f"{8 / batch:.0f}; "
                                 f"rodyn {8 / best[0]:.0f} ({best[1]})")
 
     def compare_right_hand_sides(self) -> None:
@@ -481,7 +484,8 @@ class Benchmark:
                 numbers = [("rtol", [math.nan if c.line.fixed else c.job["rtol"] for c in found], "1", "relative tolerance; NaN: fixed steps"),
                            ("fixed_step", [c.job.get("fixed_step", 0.0) for c in found], "s", "fixed step; 0: adaptive"),
                            ("seconds", [c.best for c in found], "s", "wall time, the least of all rounds"),
-                           ("seconds_median", [float(np.median(c.seconds)) if c.seconds else math.nan for c in found], "s", "median of the rounds"),
+                           ("seconds_median", [float(np.median(c.seconds)) if c.seconds else math.nan for c in found], "s",
+                            "median of the rounds"),
                            ("error_phi", [c.error_phi for c in found], "rad", "largest error of the chord angles at the probe times")]
                 if "agreement_alpha_rate" in self.attributes[scene]:
                     numbers.append(("error_alpha_rate", [c.error_alpha_rate for c in found], "rad/s", "largest error of the slope rates"))
@@ -497,7 +501,8 @@ class Benchmark:
         text = [f"Machine: {machine()}. Rodyn {commit()}; {self.names['compiler']}, flags `{plain_flags(self.names['compiler_options'])}`.",
                 f"Peers: {peers or 'none'}.", "", "```", command, "```", "", "### Figures", ""]
         text += [f"- {figure}" for figure in self.figures]
-        text += ["", "### Time at equal error", "", "Milliseconds of wall time, least of all rounds, interpolated between computations in log-log;",
+        text += ["", "### Time at equal error", "",
+                 "Milliseconds of wall time, least of all rounds, interpolated between computations in log-log;",
                  "an empty place: no computation on both sides of that error, or none within the budget.", ""]
         for scene, found in self.results.items():
             said = self.attributes[scene]
@@ -612,7 +617,8 @@ def main() -> int:
     parser.add_argument("--scenes", nargs="+", default=[], choices=SCENES, metavar="SCENE", help=f"of {', '.join(SCENES)}")
     parser.add_argument("--methods", nargs="+", default=[], help="only lines whose names contain one of these")
     parser.add_argument("--no-peers", action="store_true")
-    parser.add_argument("--budget", type=float, default=0.0, help="seconds that one computation may take; default: 1/40 of a scene's time, at most 6")
+    parser.add_argument("--budget", type=float, default=0.0,
+                        help="seconds that one computation may take; default: 1/40 of a scene's time, at most 6")
     parser.add_argument("--minutes", type=float, default=0.0, help="that the computations may take, besides references and ensembles")
     parser.add_argument("--rounds", type=int, default=0)
     parser.add_argument("--docs", action="store_true", help="put tables and pictures into docs/work_precision.md")
