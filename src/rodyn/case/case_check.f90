@@ -49,7 +49,6 @@ module rodyn_case_check
       procedure :: real_field
       procedure :: array_field
       procedure :: integer_field
-      procedure :: logical_field
       procedure :: word_field
       procedure :: text_field
    end type value_checker
@@ -447,13 +446,6 @@ contains
       copy(:) = x
       call move_alloc(copy, x)
    end subroutine shift
-
-   subroutine logical_field(self, x, row)
-      class(value_checker), intent(inout) :: self
-      logical, intent(inout) :: x
-      type(schema_row), intent(in) :: row
-      associate (unused => self, unused_x => x, unused_row => row); end associate
-   end subroutine logical_field
 
    !> A word takes the spelling of the table, as in a file.
    subroutine word_field(self, x, row)

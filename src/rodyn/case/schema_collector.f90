@@ -1,8 +1,7 @@
 !> The table of the keys that a visit passes: groups and rows as they are declared, rows with their group and type.
 module rodyn_schema_collector
-   use rodyn_kinds, only: wp
    use rodyn_field_visitor, only: field_visitor
-   use rodyn_schema, only: schema_group, schema_row, name_length, type_integer, type_logical, type_real, type_text, type_word
+   use rodyn_schema, only: schema_group, schema_row
    implicit none (type, external)
    private
    public :: schema_collector
@@ -15,13 +14,7 @@ module rodyn_schema_collector
    contains
       procedure :: table
       procedure :: open_group
-      procedure :: real_field
-      procedure :: array_field
-      procedure :: integer_field
-      procedure :: logical_field
-      procedure :: word_field
-      procedure :: text_field
-      procedure :: texts_field
+      procedure :: any_field
    end type schema_collector
 
 contains
@@ -47,7 +40,7 @@ contains
    end subroutine open_group
 
    !> Append a row of the group that is open.
-   subroutine append(self, row, type)
+   subroutine any_field(self, row, type)
       class(schema_collector), intent(inout) :: self
       type(schema_row), intent(in) :: row
       integer, intent(in) :: type
@@ -57,62 +50,6 @@ contains
       self%rows(self%n_rows) = row
       self%rows(self%n_rows)%group = self%groups(self%n_groups)%name
       self%rows(self%n_rows)%type = type
-   end subroutine append
-
-   subroutine real_field(self, x, row)
-      class(schema_collector), intent(inout) :: self
-      real(wp), intent(inout) :: x
-      type(schema_row), intent(in) :: row
-      associate (unused => x); end associate
-      call append(self, row, type_real)
-   end subroutine real_field
-
-   subroutine array_field(self, x, row)
-      class(schema_collector), intent(inout) :: self
-      real(wp), allocatable, intent(inout) :: x(:)
-      type(schema_row), intent(in) :: row
-      associate (unused => x); end associate
-      call append(self, row, type_real)
-   end subroutine array_field
-
-   subroutine integer_field(self, x, row)
-      class(schema_collector), intent(inout) :: self
-      integer, intent(inout) :: x
-      type(schema_row), intent(in) :: row
-      associate (unused => x); end associate
-      call append(self, row, type_integer)
-   end subroutine integer_field
-
-   subroutine logical_field(self, x, row)
-      class(schema_collector), intent(inout) :: self
-      logical, intent(inout) :: x
-      type(schema_row), intent(in) :: row
-      associate (unused => x); end associate
-      call append(self, row, type_logical)
-   end subroutine logical_field
-
-   subroutine word_field(self, x, row)
-      class(schema_collector), intent(inout) :: self
-      character(len=name_length), intent(inout) :: x
-      type(schema_row), intent(in) :: row
-      associate (unused => x); end associate
-      call append(self, row, type_word)
-   end subroutine word_field
-
-   subroutine text_field(self, x, row)
-      class(schema_collector), intent(inout) :: self
-      character(len=:), allocatable, intent(inout) :: x
-      type(schema_row), intent(in) :: row
-      associate (unused => x); end associate
-      call append(self, row, type_text)
-   end subroutine text_field
-
-   subroutine texts_field(self, x, row)
-      class(schema_collector), intent(inout) :: self
-      character(len=:), allocatable, intent(inout) :: x(:)
-      type(schema_row), intent(in) :: row
-      associate (unused => x); end associate
-      call append(self, row, type_text)
-   end subroutine texts_field
+   end subroutine any_field
 
 end module rodyn_schema_collector
