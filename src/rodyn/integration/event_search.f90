@@ -22,19 +22,31 @@ module rodyn_event_search
    real(wp), parameter :: small = 1.0e-3_wp      !! part of a bracket that is not worth another point
    real(wp), parameter :: idle = 1.0e-3_wp       !! a minimum that would fall by less than this part of itself stays positive
 
+   !> The step that is searched, and the last place in it that was looked at.
+   type :: searched_step
+      class(integrator_type), pointer :: integrator => null()
+      real(wp) :: t = 0.0_wp, h = 0.0_wp !! start and length [s]
+      real(wp), dimension(:), pointer, contiguous :: y0 => null(), f0 => null(), y1 => null(), f1 => null() !! ends: states, rates
+      real(wp) :: share = 0.0_wp         !! of the step, up to the place
+      real(wp), allocatable :: y(:)      !! state there
+      real(wp), allocatable :: values(:) !! functions there
+      logical :: ok = .true.             !! the state there could be computed
+   end type searched_step
+
 contains
 
    !> Find the first event of a step from t0 to t1. `integrator%margin` holds the functions at t0, and, without an event, at
    !> t1 afterwards; with one, `crossed` says which. Memory: y of the caller's.
    subroutine find_event(integrator, t0, y0, f0, t1, y1, f1, found, t, y)
-      class(integrator_type), intent(inout) :: integrator
-      real(wp), intent(in) :: t0, t1                     !! [s]
-      real(wp), contiguous, intent(in) :: y0(:), y1(:)   !! states
-      real(wp), contiguous, intent(in) :: f0(:), f1(:)   !! and their rates
+      class(integrator_type), target, intent(inout) :: integrator
+      real(wp), intent(in) :: t0, t1                           !! [s]
+      real(wp), contiguous, target, intent(in) :: y0(:), y1(:) !! states
+      real(wp), contiguous, target, intent(in) :: f0(:), f1(:) !! and their rates
       logical, intent(out) :: found
       real(wp), intent(out) :: t                         !! of the event: the first time known to be behind it [s]
       real(wp), contiguous, intent(inout) :: y(:)        !! state there
       real(wp) :: high(size(integrator%margin)), values(size(integrator%margin), 0:n_looks)
+      type(searched_step) :: step
       logical :: ok
       integer :: i, last
 
@@ -63,8 +75,16 @@ contains
          last = i
          exit
       end do
-      if (any(may_dip(values(:, :last)))) &
-         call find_dip(integrator, t0, t1 - t0, y0, f0, y1, f1, values(:, :last), found, t, high, y)
+      if (any(may_dip(values(:, :last)))) then
+         step%integrator => integrator
+         step%t = t0
+         step%h = t1 - t0
+         step%y0 => y0
+         step%f0 => f0
+         step%y1 => y1
+         step%f1 => f1
+         call find_dip(step, values(:, :last), found, t, high, y)
+      end if
       if (found) then
          call close_in(integrator, t0, integrator%margin, t, high, y)
          integrator%crossed = crosses(integrator%margin, high)
@@ -83,115 +103,143 @@ contains
    end function may_dip
 
    !> Seek such a crossing before the last point. If there is one, it takes the place of what was found.
-   subroutine find_dip(integrator, t0, h, y0, f0, y1, f1, values, found, t, high, y)
-      class(integrator_type), intent(inout) :: integrator
-      real(wp), intent(in) :: t0, h                    !! step [s]
-      real(wp), contiguous, intent(in) :: y0(:), f0(:), y1(:), f1(:)
+   subroutine find_dip(step, values, found, t, high, y)
+      type(searched_step), intent(inout) :: step
       real(wp), intent(in) :: values(:, 0:)            !! functions at the points, the first one of an event last
       logical, intent(inout) :: found
       real(wp), intent(inout) :: t                     !! upper end of a bracket of the event [s]
       real(wp), intent(inout) :: high(:)               !! functions there
       real(wp), contiguous, intent(inout) :: y(:)      !! state there
-      real(wp) :: x(0:n_looks + 2), v(size(values, 1), 0:n_looks + 2), here(size(values, 1)), y_try(size(y)), share
-      logical :: candidate(size(values, 1)), ok
+      real(wp) :: x(0:n_looks + 2), v(size(values, 1), 0:n_looks + 2)
+      logical :: candidate(size(values, 1))
       integer :: i, j, last
 
+      allocate (step%y(size(y)), step%values(size(high)))
       last = ubound(values, 2)
       candidate = may_dip(values)
       x(:last) = [(real(i, wp)/n_looks, i=0, last)]
       v(:, :last) = values
-      if (any(candidate .and. v(:, 0) <= v(:, 1))) call insert(1, probe) ! does it fall first?
-      if (.not. found .and. any(candidate .and. v(:, last) <= v(:, last - 1))) call insert(last, 1.0_wp - probe)
+      if (any(candidate .and. v(:, 0) <= v(:, 1))) call insert(step, 1, probe, x, v, last) ! does it fall first?
+      if (.not. found .and. any(candidate .and. v(:, last) <= v(:, last - 1))) &
+         call insert(step, last, 1.0_wp - probe, x, v, last)
       do i = 1, last - 1
          do j = 1, size(candidate)
             if (.not. candidate(j) .or. v(j, i) > min(v(j, i - 1), v(j, i + 1))) cycle
-            if (.not. dips(j, x(i - 1:i + 1), v(j, i - 1:i + 1), maxval(values(j, :)) - minval(values(j, :)))) cycle
+            if (.not. dips(step, j, x(i - 1:i + 1), v(j, i - 1:i + 1), maxval(values(j, :)) - minval(values(j, :)))) cycle
             found = .true.
-            t = t0 + share*h
-            high = here
-            y = y_try
+            t = step%t + step%share*step%h
+            high = step%values
+            y = step%y
             return
          end do
       end do
-
-   contains
-
-      !> One more point, on the interpolant.
-      subroutine insert(place, new)
-         integer, intent(in) :: place
-         real(wp), intent(in) :: new !! share of the step
-         x(place + 1:last + 1) = x(place:last)
-         v(:, place + 1:last + 1) = v(:, place:last)
-         x(place) = new
-         call look(new)
-         v(:, place) = here
-         last = last + 1
-      end subroutine insert
-
-      !> All functions on the interpolant.
-      subroutine look(at)
-         real(wp), intent(in) :: at
-         call interpolate(at, h, y0, f0, y1, f1, y_try)
-         call integrator%system%event_functions(t0 + at*h, y_try, here)
-      end subroutine look
-
-      !> One of them on a state as accurate as the steps.
-      real(wp) function measured(which, at)
-         integer, intent(in) :: which
-         real(wp), intent(in) :: at
-         share = at
-         call integrator%state_within(t0 + at*h, y_try, ok)
-         if (ok) call integrator%system%event_functions(t0 + at*h, y_try, here)
-         measured = merge(here(which), huge(1.0_wp), ok)
-      end function measured
-
-      !> Is this function negative near its minimum inside a bracket? Then `here`, `y_try` and `share` are of such a place.
-      logical function dips(which, ends, at_ends, change)
-         integer, intent(in) :: which
-         real(wp), intent(in) :: ends(3), at_ends(3) !! bracket and its middle; functions there
-         real(wp), intent(in) :: change              !! of the function in the step
-         real(wp) :: a(3), f(3), off, curvature, reach, trial
-         integer :: k
-
-         dips = .false.
-         a = ends
-         f = at_ends
-         curvature = bend(a, f)
-         if (.not. curvature > 0.0_wp) return
-         do k = 1, most_narrowings
-            trial = vertex(a, f)
-            if (abs(trial - a(2)) <= small*(a(3) - a(1))) exit
-            call look(trial)
-            call narrow(a, f, trial, here(which))
-         end do
-         if (f(2) > nearby*change) return
-         off = f(2)
-         f(2) = measured(which, a(2))
-         dips = f(2) <= 0.0_wp
-         off = abs(f(2) - off)
-         if (dips .or. .not. ok .or. f(2) > safety*off) return
-         ! The minimum is where the interpolant has risen by less than it may be off, here and there.
-         reach = sqrt(4.0_wp*safety*off/curvature)
-         a([1, 3]) = [max(ends(1), a(2) - reach), min(ends(3), a(2) + reach)]
-         if (.not. (a(1) < a(2) .and. a(2) < a(3))) return
-         do k = 1, 3, 2
-            f(k) = measured(which, a(k))
-            dips = f(k) <= 0.0_wp
-            if (dips .or. .not. ok) return
-         end do
-         do k = 1, most_narrowings
-            if (f(2) > min(f(1), f(3))) return ! its minimum is not in the bracket
-            trial = vertex(a, f)
-            if (abs(trial - a(2)) <= small*(a(3) - a(1))) return
-            if (0.5_wp*bend(a, f)*(trial - a(2))**2 < idle*f(2)) return
-            off = measured(which, trial)
-            dips = off <= 0.0_wp
-            if (dips .or. .not. ok) return
-            call narrow(a, f, trial, off)
-         end do
-      end function dips
-
    end subroutine find_dip
+
+   !> One more point, on the interpolant.
+   subroutine insert(step, place, new, x, v, last)
+      type(searched_step), intent(inout) :: step
+      integer, intent(in) :: place                  !! of the new point among the others
+      real(wp), intent(in) :: new                   !! share of the step
+      real(wp), intent(inout) :: x(0:), v(:, 0:)    !! points; functions there
+      integer, intent(inout) :: last                !! index of the last point
+      x(place + 1:last + 1) = x(place:last)
+      v(:, place + 1:last + 1) = v(:, place:last)
+      x(place) = new
+      call look(step, new)
+      v(:, place) = step%values
+      last = last + 1
+   end subroutine insert
+
+   !> All functions on the interpolant.
+   subroutine look(step, at)
+      type(searched_step), intent(inout) :: step
+      real(wp), intent(in) :: at !! share of the step
+      call interpolate(at, step%h, step%y0, step%f0, step%y1, step%f1, step%y)
+      call step%integrator%system%event_functions(step%t + at*step%h, step%y, step%values)
+   end subroutine look
+
+   !> One of them on a state as accurate as the steps.
+   subroutine measure(step, which, at, value)
+      type(searched_step), intent(inout) :: step
+      integer, intent(in) :: which
+      real(wp), intent(in) :: at     !! share of the step
+      real(wp), intent(out) :: value !! huge, if there is no such state
+      step%share = at
+      call step%integrator%state_within(step%t + at*step%h, step%y, step%ok)
+      if (step%ok) call step%integrator%system%event_functions(step%t + at*step%h, step%y, step%values)
+      value = merge(step%values(which), huge(1.0_wp), step%ok)
+   end subroutine measure
+
+   !> Is this function negative near its minimum inside a bracket? Then the step has been looked at there.
+   logical function dips(step, which, ends, at_ends, change)
+      type(searched_step), intent(inout) :: step
+      integer, intent(in) :: which
+      real(wp), intent(in) :: ends(3), at_ends(3) !! bracket and its middle; functions there
+      real(wp), intent(in) :: change              !! of the function in the step
+      real(wp) :: a(3), f(3), off, curvature, reach
+      integer :: k
+
+      dips = .false.
+      a = ends
+      f = at_ends
+      curvature = bend(a, f)
+      if (.not. curvature > 0.0_wp) return
+      call descend(step, which, a, f)
+      if (f(2) > nearby*change) return
+      off = f(2)
+      call measure(step, which, a(2), f(2))
+      dips = f(2) <= 0.0_wp
+      off = abs(f(2) - off)
+      if (dips .or. .not. step%ok .or. f(2) > safety*off) return
+      ! The minimum is where the interpolant has risen by less than it may be off, here and there.
+      reach = sqrt(4.0_wp*safety*off/curvature)
+      a([1, 3]) = [max(ends(1), a(2) - reach), min(ends(3), a(2) + reach)]
+      if (.not. (a(1) < a(2) .and. a(2) < a(3))) return
+      do k = 1, 3, 2
+         call measure(step, which, a(k), f(k))
+         dips = f(k) <= 0.0_wp
+         if (dips .or. .not. step%ok) return
+      end do
+      dips = falls_below_zero(step, which, a, f)
+   end function dips
+
+   !> Narrow a bracket down to the minimum of a function on the interpolant.
+   subroutine descend(step, which, a, f)
+      type(searched_step), intent(inout) :: step
+      integer, intent(in) :: which
+      real(wp), intent(inout) :: a(3), f(3) !! bracket and its middle; the function there
+      real(wp) :: trial
+      integer :: k
+      do k = 1, most_narrowings
+         trial = vertex(a, f)
+         if (abs(trial - a(2)) <= small*(a(3) - a(1))) return
+         call look(step, trial)
+         call narrow(a, f, trial, step%values(which))
+      end do
+   end subroutine descend
+
+   !> The same on accurate states, until the function is negative or its minimum is known to be positive.
+   logical function falls_below_zero(step, which, ends, at_ends)
+      type(searched_step), intent(inout) :: step
+      integer, intent(in) :: which
+      real(wp), intent(in) :: ends(3), at_ends(3) !! bracket and its middle; the function there
+      real(wp) :: a(3), f(3), trial, value
+      integer :: k
+
+      falls_below_zero = .false.
+      a = ends
+      f = at_ends
+      do k = 1, most_narrowings
+         if (f(2) > min(f(1), f(3))) return ! its minimum is not in the bracket
+         trial = vertex(a, f)
+         if (abs(trial - a(2)) <= small*(a(3) - a(1))) return
+         if (0.5_wp*bend(a, f)*(trial - a(2))**2 < idle*f(2)) return
+         call measure(step, which, trial, value)
+         falls_below_zero = value <= 0.0_wp
+         if (falls_below_zero .or. .not. step%ok) return
+         call narrow(a, f, trial, value)
+      end do
+   end function falls_below_zero
 
    !> Second derivative of the parabola through three points.
    pure real(wp) function bend(x, f)
