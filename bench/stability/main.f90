@@ -11,7 +11,7 @@ program bench_stability
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_frequencies, only: decay_rates, natural_frequencies
    use rodyn_accelerations, only: dynamics_type, new_dynamics
-   use rodyn_erk_integrator, only: erk_tableau
+   use rodyn_erk_tableau, only: erk_tableau
    use rodyn_stability_function, only: stability_function, stability_function_of
    use rodyn_step_limit, only: largest_stable_step
    use rodyn_bench_campaign_runs, only: run_result, run_campaign_case, article_chain

@@ -3,7 +3,7 @@
 module rodyn_dop853_step
    use rodyn_kinds, only: wp
    use rodyn_ode, only: ode_system
-   use rodyn_integrator, only: solver_options, stricter
+   use rodyn_integrator, only: solver_options, stricter, cannot_evaluate
    use rodyn_dop853_tableau, only: c2, c3, c4, c5, c6, c7, c8, c9, c10, c11, c12, a2_1, a3_1, a3_2, a4_1, &
       a4_3, a5_1, a5_3, a5_4, a6_1, a6_4, a6_5, a7_1, a7_4, a7_5, a7_6, a8_1, a8_4, a8_5, a8_6, a8_7, a9_1, &
       a9_4, a9_5, a9_6, a9_7, a9_8, a10_1, a10_4, a10_5, a10_6, a10_7, a10_8, a10_9, a11_1, a11_4, a11_5, &
@@ -13,8 +13,10 @@ module rodyn_dop853_step
    implicit none (type, external)
    private
    public :: n_stages, inner_options, stages, add_increment, error_norm, quadrature_errors
+   public :: safety, shrink, grow, choose_end, trial_step, first_step_length, obstacle
 
    integer, parameter :: n_stages = 12
+   real(wp), parameter :: safety = 0.9_wp, shrink = 1.0_wp/3.0_wp, grow = 6.0_wp !! of the choice of steps (Hairer's)
 
 contains
 
@@ -127,5 +129,54 @@ contains
          if (abs(e5) > 0.0_wp) error(i - n) = abs(h*e5)*(abs(e5)/hypot(e5, 0.1_wp*e3))
       end do
    end subroutine quadrature_errors
+
+   !> The step to try and the time it ends at: on the stop time if that is near.
+   pure subroutine choose_end(t, t_lost, t_stop, h_next, h, t_new)
+      real(wp), intent(in) :: t, t_lost !! now, and what rounding took from it [s]
+      real(wp), intent(in) :: t_stop    !! [s]
+      real(wp), intent(in) :: h_next    !! step that the error allows [s]
+      real(wp), intent(out) :: h, t_new !! [s]
+
+      h = h_next
+      t_new = t + (h - t_lost)
+      if (t_new < t_stop) then
+         if (t + 1.8_wp*h > t_stop) h = 0.5_wp*(t_stop - t) ! two even steps rather than one and a sliver
+         if (h < h_next) t_new = t + (h - t_lost)
+      else
+         t_new = t_stop
+         h = t_stop - t
+      end if
+   end subroutine choose_end
+
+   !> A short step for a look at how rates change (Hairer, Norsett & Wanner, sec. II.4).
+   pure real(wp) function trial_step(d0, d1, span)
+      real(wp), intent(in) :: d0, d1 !! weighted norms of the state and of its rates
+      real(wp), intent(in) :: span   !! to the stop time [s]
+      trial_step = 1.0e-6_wp
+      if (min(d0, d1) > 1.0e-5_wp) trial_step = 0.01_wp*d0/d1
+      trial_step = min(trial_step, span)
+   end function trial_step
+
+   !> Length of the first step by that look (sec. II.4).
+   pure real(wp) function first_step_length(h0, d1, d2, span)
+      real(wp), intent(in) :: h0     !! `trial_step` [s]
+      real(wp), intent(in) :: d1, d2 !! weighted norms of the rates and of their change in that step, by its length
+      real(wp), intent(in) :: span   !! to the stop time [s]
+      real(wp) :: h1
+      if (max(d1, d2) <= 1.0e-15_wp) then
+         h1 = max(1.0e-6_wp, 1.0e-3_wp*h0)
+      else
+         h1 = (0.01_wp/max(d1, d2))**0.125_wp
+      end if
+      first_step_length = min(100.0_wp*h0, h1, span)
+   end function first_step_length
+
+   !> What stands in the way of a step.
+   pure function obstacle(refused) result(text)
+      logical, intent(in) :: refused !! the right-hand side could not be evaluated
+      character(len=:), allocatable :: text
+      text = 'the right-hand side was not finite, or no step is small enough'
+      if (refused) text = cannot_evaluate
+   end function obstacle
 
 end module rodyn_dop853_step

@@ -16,11 +16,16 @@ module rodyn_integrator
    use rodyn_errors, only: error_type, raise, exit_stopped
    use rodyn_methods, only: solver_options
    use rodyn_ode, only: ode_system
+   use rodyn_pace, only: pace_type
    use rodyn_text, only: time_text
    implicit none (type, external)
    private
    public :: integrator_type, solver_options, solver_statistics, monitor_type
-   public :: stricter, judged_steps, is_hopeless, hopeless_text
+   public :: stricter, cannot_evaluate
+
+   !> Why a step of a mechanical system cannot be made.
+   character(len=*), parameter :: cannot_evaluate = &
+      'the right-hand side could not be evaluated (mass matrix not positive definite, or not finite)'
 
    !> Counts over the whole run, restarts included.
    type :: solver_statistics
@@ -56,8 +61,7 @@ module rodyn_integrator
       logical :: pending = .false.        !! the steps have met an event, at t_good
       logical, allocatable :: crossed(:)  !! the event functions that became negative there (n_events)
       real(wp), allocatable :: margin(:)  !! event functions at the end of the last step (n_events)
-      integer(i8), private :: n_judged = 0     !! steps and time at the last look at the pace
-      real(wp), private :: t_judged = 0.0_wp   !! [s]
+      type(pace_type), private :: step_pace
       integer(i8), private :: clock_report = 0, clock_look = 0 !! wall clock at the last report, the last look [counts]
       integer, private :: steps_to_look = 1, stride = 1        !! the clock is read every `stride` steps and outputs
    contains
@@ -123,8 +127,6 @@ module rodyn_integrator
    end interface
 
    real(wp), parameter :: report_interval = 0.2_wp !! wall time between two reports [s]
-   integer, parameter :: judged_steps = 1000       !! after so many, the pace is judged: enough for any first step to grow
-   real(wp), parameter :: hopeless = 1.0e12_wp     !! steps to the stop time: weeks for the smallest scene
 
 contains
 
@@ -186,8 +188,7 @@ contains
       self%t_good = t
       self%y_good = y
       self%n_starts = self%n_starts + 1
-      self%n_judged = self%n_steps
-      self%t_judged = t
+      call self%step_pace%begin(self%n_steps, t)
       self%at_event = .false.
       self%pending = .false.
       associate (n => self%system%n_events)
@@ -220,26 +221,17 @@ contains
       ok = .false.
    end subroutine state_within
 
-   !> Called before each internal step: counts it, refuses one too many, gives up where no end is in sight, lets the
+   !> Called before each internal step: counts it, refuses one too many, gives up without progress, lets the
    !> monitor speak and stop the run.
    subroutine permit_step(self, error)
       class(integrator_type), intent(inout) :: self
-      type(error_type), allocatable, intent(out) :: error !! max_steps reached, no end in sight, or a stop was requested
+      type(error_type), allocatable, intent(out) :: error !! max_steps reached, no progress, or a stop was requested
+      character(len=:), allocatable :: refusal
 
-      character(len=20) :: digits
-
-      if (self%n_steps >= self%options%max_steps) then
-         write (digits, '(i0)') self%options%max_steps
-         call raise(error, 'max_steps = '//trim(digits)//' reached at t = '//time_text(self%t_good)//' s')
+      call self%step_pace%judge(self%n_steps, self%options%max_steps, self%t_good, self%t_stop, refusal)
+      if (allocated(refusal)) then
+         call raise(error, refusal)
          return
-      end if
-      if (self%n_steps >= self%n_judged + judged_steps) then
-         if (is_hopeless(self%t_good - self%t_judged, self%t_stop - self%t_good)) then
-            call raise(error, hopeless_text(self%t_good, self%t_good - self%t_judged))
-            return
-         end if
-         self%n_judged = self%n_steps
-         self%t_judged = self%t_good
       end if
       call self%heed_monitor(self%t_good, error)
       if (.not. allocated(error)) self%n_steps = self%n_steps + 1
@@ -265,24 +257,6 @@ contains
       integer, intent(in) :: n
       self%steps_to_look = max(1, self%steps_to_look - n)
    end subroutine count_as_steps
-
-   !> After `judged_steps` steps: would it take `hopeless` of them to get to the stop time?
-   pure logical function is_hopeless(done, left)
-      real(wp), intent(in) :: done !! time that these steps have covered [s]
-      real(wp), intent(in) :: left !! time to the stop time [s]
-      is_hopeless = done < left*(judged_steps/hopeless)
-   end function is_hopeless
-
-   !> The same in words.
-   pure function hopeless_text(t, done) result(text)
-      real(wp), intent(in) :: t    !! time reached [s]
-      real(wp), intent(in) :: done !! as above [s]
-      character(len=:), allocatable :: text
-      character(len=8) :: steps
-      write (steps, '(i0)') judged_steps
-      text = 'no progress at t = '//time_text(t)//' s: the last '//trim(steps)//' steps advanced '//time_text(done)// &
-             ' s; are loads or initial values out of scale?'
-   end function hopeless_text
 
    !> Report when it is time, and choose how many steps and outputs to make until the next look: about 20 ms of them.
    subroutine look_at_clock(self, t)

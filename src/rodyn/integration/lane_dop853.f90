@@ -22,11 +22,12 @@ module rodyn_lane_dop853
    use rodyn_lanes, only: lanes
    use rodyn_aligned_store, only: aligned_store
    use rodyn_lane_ode, only: lane_system
-   use rodyn_integrator, only: solver_options, solver_statistics, judged_steps, is_hopeless, hopeless_text
-   use rodyn_text, only: to_text, time_text
-   use rodyn_dop853_step, only: inner_options
+   use rodyn_integrator, only: solver_options, solver_statistics
+   use rodyn_pace, only: pace_type
+   use rodyn_text, only: time_text
+   use rodyn_dop853_step, only: inner_options, choose_end, trial_step, first_step_length, obstacle, safety, shrink, grow
    use rodyn_dop853_nystrom, only: n_stages, node
-   use rodyn_lane_dop853_sums, only: hopeless, turning_rates, stage_states, turning_stage, end_of_step, check_rates, &
+   use rodyn_lane_dop853_sums, only: failed_norm, turning_rates, stage_states, turning_stage, end_of_step, check_rates, &
       advance_states, advance_rates
    implicit none (type, external)
    private
@@ -39,7 +40,6 @@ module rodyn_lane_dop853
    integer, parameter :: at_failure = 3 !! no way on
 
    integer, parameter :: idle = 0, stepping = 1, on_side_trip = 2 !! what a lane does in a pass
-   real(wp), parameter :: safety = 0.9_wp, shrink = 1.0_wp/3.0_wp, grow = 6.0_wp ! Hairer's
 
    !> Where a lane is, beside its states.
    type :: lane_course
@@ -52,8 +52,7 @@ module rodyn_lane_dop853
       real(wp) :: t_wanted = huge(1.0_wp) !! next output, not after t_stop; huge: none [s]
       real(wp) :: h_next = 0.0_wp    !! step to try next [s]
       integer :: event = at_nothing
-      integer(i8) :: n_judged = 0    !! steps and time at the last look at the pace
-      real(wp) :: t_judged = 0.0_wp  !! [s]
+      type(pace_type) :: pace
       logical :: rejected = .false.  !! the last try was
       logical :: refused = .false.   !! because the right-hand side said so
       type(solver_options) :: options
@@ -179,12 +178,11 @@ contains
          course%t_stop = t_stop
          course%t_wanted = t_wanted
          course%rejected = .false.
-         course%n_judged = course%counts%n_steps
-         course%t_judged = course%t
+         call course%pace%begin(course%counts%n_steps, course%t)
          course%counts%n_starts = course%counts%n_starts + 1
          call evaluate_one(self, lane, course%t, self%q, self%p, ok)
          if (.not. ok) then
-            call fail(self, lane, 'dop853 at t = '//time_text(course%t)//' s: '//trouble(course))
+            call cannot_step(self, lane)
             return
          end if
          self%f(lane, :, 1) = self%f_new(lane, :)
@@ -265,7 +263,7 @@ contains
       integer :: lane, s
 
       do lane = 1, lanes
-         call choose_end(self, lane)
+         call begin_pass(self, lane)
       end do
       good = .true.
       if (self%n_turning > 0) call turning_rates(self%m, self%q, self%p, self%turn(:, :, 1))
@@ -293,10 +291,11 @@ contains
       end do
    end subroutine try
 
-   !> The step to try and the time it ends at: on the stop time if that is near.
-   subroutine choose_end(self, lane)
+   !> The step to try and the time it ends at.
+   subroutine begin_pass(self, lane)
       class(lane_dop853), intent(inout) :: self
       integer, intent(in) :: lane
+      character(len=:), allocatable :: refusal
       real(wp) :: h
 
       self%h(lane) = 0.0_wp
@@ -306,38 +305,21 @@ contains
             self%h(lane) = course%t_wanted - course%t_base
             return
          end if
-         if (course%counts%n_steps >= course%options%max_steps) then
-            call fail(self, lane, 'max_steps = '//to_text(course%options%max_steps)//' reached at t = '// &
-                      time_text(course%t)//' s')
+         call course%pace%judge(course%counts%n_steps, course%options%max_steps, course%t, course%t_stop, refusal)
+         if (allocated(refusal)) then
+            call fail(self, lane, refusal)
             return
          end if
-         if (course%counts%n_steps >= course%n_judged + judged_steps) then
-            if (is_hopeless(course%t - course%t_judged, course%t_stop - course%t)) then
-               call fail(self, lane, hopeless_text(course%t, course%t - course%t_judged))
-               return
-            end if
-            course%n_judged = course%counts%n_steps
-            course%t_judged = course%t
-         end if
-         h = course%h_next
-         course%t_new = course%t + (h - course%t_lost)
-         if (course%t_new < course%t_stop) then
-            ! Two even steps rather than one and a sliver.
-            if (course%t + 1.8_wp*h > course%t_stop) h = 0.5_wp*(course%t_stop - course%t)
-            if (h < course%h_next) course%t_new = course%t + (h - course%t_lost)
-         else
-            course%t_new = course%t_stop
-            h = course%t_stop - course%t
-         end if
+         call choose_end(course%t, course%t_lost, course%t_stop, course%h_next, h, course%t_new)
          if (h <= 8.0_wp*epsilon(h)*abs(course%t)) then
             if (h <= 4.0_wp*spacing(course%t)) then
-               call fail(self, lane, 'dop853 at t = '//time_text(course%t)//' s: '//trouble(course))
+               call cannot_step(self, lane)
                return
             end if
          end if
          self%h(lane) = h
       end associate
-   end subroutine choose_end
+   end subroutine begin_pass
 
    !> Accept or refuse what a lane has tried, and choose its next step.
    subroutine judge(self, lane, good, new_good, norm, commit, move)
@@ -368,7 +350,7 @@ contains
          course%refused = .not. good .or. (accepted .and. .not. new_good)
          accepted = accepted .and. new_good
          factor = shrink
-         if (good .and. norm < hopeless) factor = max(shrink, safety/sqrt(sqrt(sqrt(max(norm, tiny(norm))))))
+         if (good .and. norm < failed_norm) factor = max(shrink, safety/sqrt(sqrt(sqrt(max(norm, tiny(norm))))))
          if (.not. accepted) then
             if (norm <= 1.0_wp) factor = shrink ! the end of the step could not be evaluated
             course%counts%n_error_test_failures = course%counts%n_error_test_failures + 1
@@ -447,16 +429,13 @@ contains
       self%h(lane) = 0.0_wp
    end subroutine fail
 
-   !> What stands in the way of a step.
-   pure function trouble(course) result(text)
-      type(lane_course), intent(in) :: course
-      character(len=:), allocatable :: text
-      if (course%refused) then
-         text = 'the right-hand side could not be evaluated (mass matrix not positive definite, or not finite)'
-      else
-         text = 'the right-hand side was not finite, or no step is small enough'
-      end if
-   end function trouble
+   subroutine cannot_step(self, lane)
+      class(lane_dop853), intent(inout) :: self
+      integer, intent(in) :: lane
+      associate (course => self%course(lane))
+         call fail(self, lane, 'dop853 at t = '//time_text(course%t)//' s: '//obstacle(course%refused))
+      end associate
+   end subroutine cannot_step
 
    !> Accelerations of one lane, in `f_new`. The others are computed, too, and not used.
    subroutine evaluate_one(self, lane, t, q, p, ok)
@@ -481,7 +460,7 @@ contains
    subroutine first_step(self, lane)
       class(lane_dop853), intent(inout) :: self
       integer, intent(in) :: lane
-      real(wp) :: d0, d1, d2, h0, h1, root
+      real(wp) :: d0, d1, d2, h0, root
       real(wp), dimension(2*self%m) :: y, f, f_ahead, scale
       logical :: ok
 
@@ -493,9 +472,7 @@ contains
          scale = options%atol + options%rtol*abs(y)
          d0 = norm2(y/scale)/root
          d1 = norm2(f/scale)/root
-         h0 = 1.0e-6_wp
-         if (min(d0, d1) > 1.0e-5_wp) h0 = 0.01_wp*d0/d1
-         h0 = min(h0, course%t_stop - course%t)
+         h0 = trial_step(d0, d1, course%t_stop - course%t)
          self%q_stage = self%q
          self%p_stage = self%p
          self%q_stage(lane, :) = y(:m) + h0*f(:m)
@@ -504,12 +481,7 @@ contains
          if (ok) then
             call all_rates(self, self%q_stage, self%p_stage, self%f_new, lane, f_ahead)
             d2 = norm2((f_ahead - f)/scale)/root/h0
-            if (max(d1, d2) <= 1.0e-15_wp) then
-               h1 = max(1.0e-6_wp, 1.0e-3_wp*h0)
-            else
-               h1 = (0.01_wp/max(d1, d2))**0.125_wp
-            end if
-            course%h_next = min(100.0_wp*h0, h1, course%t_stop - course%t)
+            course%h_next = first_step_length(h0, d1, d2, course%t_stop - course%t)
          else
             course%h_next = 1.0e-3_wp*h0
          end if

@@ -6,9 +6,9 @@ module rodyn_lane_dop853_sums
    use rodyn_dop853_nystrom, only: n_stages, node, a, a2, b, b2, e5, e5_2, e3, e3_2
    implicit none (type, external)
    private
-   public :: hopeless, turning_rates, stage_states, turning_stage, end_of_step, check_rates, advance_states, advance_rates
+   public :: failed_norm, turning_rates, stage_states, turning_stage, end_of_step, check_rates, advance_states, advance_rates
 
-   real(wp), parameter :: hopeless = 1.0e300_wp !! error norm of a step that came to nothing
+   real(wp), parameter :: failed_norm = 1.0e300_wp !! error norm of a step that came to nothing
 
 contains
 
@@ -250,7 +250,7 @@ contains
    end subroutine turning_stage
 
    !> Increments, the new state, and the norm of its error: root mean square of error/tolerance, Hairer's mix of the two
-   !> estimates. Anything that is not finite makes it `hopeless`.
+   !> estimates. Anything that is not finite makes it `failed_norm`.
    pure subroutine end_of_step(m, n_turning, h, q, p, f, turn, q_lost, p_lost, rtol, atol, q_increment, p_increment, q_new, &
                                p_new, norm)
       integer, intent(in) :: m, n_turning
@@ -320,7 +320,7 @@ contains
       do l = 1, lanes
          both = 2*m*(sum_5(l) + 0.01_wp*sum_3(l))
          norm(l) = abs(h(l))*sum_5(l)/sqrt(max(both, tiny(1.0_wp)))
-         norm(l) = merge(norm(l), hopeless, both <= huge(1.0_wp) .and. norm(l) <= huge(1.0_wp) .and. bad(l) < 0.5_wp)
+         norm(l) = merge(norm(l), failed_norm, both <= huge(1.0_wp) .and. norm(l) <= huge(1.0_wp) .and. bad(l) < 0.5_wp)
       end do
    end subroutine end_of_step
 

@@ -4,13 +4,12 @@ module rodyn_quadrature_refinement
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp, i8
    use rodyn_ode, only: ode_system, n_quadratures
-   use rodyn_dop853_step, only: n_stages, stages, add_increment, error_norm, quadrature_errors
+   use rodyn_dop853_step, only: n_stages, stages, add_increment, error_norm, quadrature_errors, safety, shrink, grow
    implicit none (type, external)
    private
    public :: quadrature_refinement
 
    integer, parameter :: most_steps = 200 !! within one step
-   real(wp), parameter :: safety = 0.9_wp, shrink = 1.0_wp/3.0_wp, grow = 6.0_wp
 
    !> Memory of such steps, taken when the first is needed.
    type :: quadrature_refinement

@@ -5,7 +5,7 @@ module rodyn_stability_function
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
    use rodyn_dop853_nystrom, only: dop853_a => a, dop853_b => b
-   use rodyn_erk_integrator, only: erk_tableau
+   use rodyn_erk_tableau, only: erk_tableau
    implicit none (type, external)
    private
    public :: stability_function, new_stability_function, stability_function_of

@@ -1,6 +1,6 @@
-!> What CVODE and ARKODE share: the callbacks, the text of return codes, the version.
+!> What CVODE and ARKODE are given and what they return: the callbacks, the text of return codes, the version.
 module rodyn_sundials_base
-   use, intrinsic :: iso_c_binding, only: c_ptr, c_int, c_double, c_char, c_size_t, &
+   use, intrinsic :: iso_c_binding, only: c_ptr, c_int, c_long, c_double, c_char, c_size_t, &
       c_f_pointer, c_loc, c_associated
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type, raise
@@ -10,7 +10,7 @@ module rodyn_sundials_base
    use fsundials_nvector_mod, only: N_Vector
    implicit none (type, external)
    private
-   public :: callback_data, rhs_shim, weights_shim, quiet_handler, all_finite, raise_return_code, sundials_version
+   public :: callback_data, rhs_shim, weights_shim, quiet_handler, all_finite, check, sundials_version
 
    !> What the callbacks find behind `user_data`.
    type :: callback_data
@@ -37,6 +37,21 @@ module rodyn_sundials_base
          integer(c_int), intent(in), value :: length
          integer(c_int) :: flag
       end function get_version
+
+      !> Names of return codes. The caller frees the text; the Fortran interfaces of SUNDIALS would lose it.
+      function cvode_flag_name(flag) result(text) bind(c, name='CVodeGetReturnFlagName')
+         import :: c_ptr, c_long
+         implicit none (type, external)
+         integer(c_long), intent(in), value :: flag
+         type(c_ptr) :: text
+      end function cvode_flag_name
+
+      function erkstep_flag_name(flag) result(text) bind(c, name='ERKStepGetReturnFlagName')
+         import :: c_ptr, c_long
+         implicit none (type, external)
+         integer(c_long), intent(in), value :: flag
+         type(c_ptr) :: text
+      end function erkstep_flag_name
 
       !> The C library's free.
       subroutine c_release(address) bind(c, name='free')
@@ -154,21 +169,26 @@ contains
       end select
    end function failure_text
 
-   !> A negative return code as an error that names the call, the time and the code.
-   subroutine raise_return_code(error, flag, name, call_name, t)
+   !> A negative return code becomes an error that names the call, the time and the code. An earlier error stays.
+   subroutine check(error, flag, call_name, t)
       type(error_type), allocatable, intent(inout) :: error
       integer(c_int), intent(in) :: flag
-      type(c_ptr), intent(in) :: name            !! of the code, in memory that is freed here
       character(len=*), intent(in) :: call_name
-      real(wp), intent(in), optional :: t        !! [s]
-
+      real(wp), intent(in), optional :: t !! [s]
       character(len=:), allocatable :: place
+      type(c_ptr) :: name
 
+      if (flag >= 0_c_int .or. allocated(error)) return
+      if (index(call_name, 'ERKStep') == 1) then
+         name = erkstep_flag_name(int(flag, c_long))
+      else
+         name = cvode_flag_name(int(flag, c_long))
+      end if
       place = ''
       if (present(t)) place = ' at t = '//time_text(t)//' s'
       call raise(error, call_name//place//': '//failure_text(flag)//' ('//c_text(name)//')')
       if (c_associated(name)) call c_release(name)
-   end subroutine raise_return_code
+   end subroutine check
 
    !> A C string as text; empty for a null pointer.
    function c_text(address) result(text)
