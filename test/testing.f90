@@ -27,14 +27,14 @@ module test_testing
       integer :: failed = 0
    end type suite_tally
 
-   !> Fail unless a condition holds.
+   !> Fail unless a condition holds. The first failure of a test stays: the checks after it do nothing.
    interface check
       module procedure check_condition
       module procedure check_integer
       module procedure check_text
    end interface check
 
-   !> Fail unless |actual - expected| <= tolerance everywhere; NaN always fails.
+   !> Fail unless |actual - expected| <= tolerance everywhere; NaN always fails. The first failure stays.
    interface check_close
       module procedure check_close_scalar
       module procedure check_close_array
@@ -92,32 +92,33 @@ contains
    end function chosen
 
    subroutine check_condition(error, condition, message)
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(inout) :: error
       logical, intent(in) :: condition
       character(len=*), intent(in) :: message
-      if (.not. condition) call raise(error, message)
+      if (.not. (condition .or. allocated(error))) call raise(error, message)
    end subroutine check_condition
 
    subroutine check_integer(error, actual, expected, message)
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(inout) :: error
       integer, intent(in) :: actual, expected
       character(len=*), intent(in) :: message
       character(len=80) :: numbers
-      if (actual == expected) return
+      if (actual == expected .or. allocated(error)) return
       write (numbers, '(": ", i0, " instead of ", i0)') actual, expected
       call raise(error, message//trim(numbers))
    end subroutine check_integer
 
    subroutine check_text(error, actual, expected, message)
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(inout) :: error
       character(len=*), intent(in) :: actual, expected
       character(len=*), intent(in) :: message
+      if (allocated(error)) return
       if (actual == expected .and. len(actual) == len(expected)) return
       call raise(error, message//': "'//actual//'" instead of "'//expected//'"')
    end subroutine check_text
 
    subroutine check_close_scalar(error, actual, expected, tolerance, message)
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(inout) :: error
       real(wp), intent(in) :: actual, expected
       real(wp), intent(in) :: tolerance !! absolute
       character(len=*), intent(in) :: message
@@ -125,13 +126,14 @@ contains
    end subroutine check_close_scalar
 
    subroutine check_close_array(error, actual, expected, tolerance, message)
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(inout) :: error
       real(wp), intent(in) :: actual(:), expected(:)
       real(wp), intent(in) :: tolerance !! absolute
       character(len=*), intent(in) :: message
       character(len=200) :: numbers
       integer :: i
 
+      if (allocated(error)) return
       if (size(actual) /= size(expected)) then
          write (numbers, '(": ", i0, " values instead of ", i0)') size(actual), size(expected)
          call raise(error, message//trim(numbers))
