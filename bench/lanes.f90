@@ -5,6 +5,7 @@
 module rodyn_lanes_bench
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type
+   use rodyn_bench_support, only: median, set_in_motion, stopwatch, table1_chain
    use rodyn_case_config, only: case_config
    use rodyn_lanes, only: lanes
    use rodyn_scene, only: scene_type, new_scene
@@ -111,13 +112,12 @@ contains
       real(wp), intent(out) :: phi(n_cases), seconds
       integer(i8), intent(out) :: n_rhs
       type(sweep_client) :: client
-      integer(i8) :: start, finish, rate
+      type(stopwatch) :: clock
 
       client%options = options
-      call system_clock(start, rate)
+      call clock%start()
       call run_ensemble(client)
-      call system_clock(finish)
-      seconds = real(finish - start, wp)/real(rate, wp)
+      seconds = clock%seconds()
       phi = client%phi
       n_rhs = client%n_rhs
    end subroutine by_lanes
@@ -134,11 +134,11 @@ contains
       type(nobody) :: observer
       real(wp), allocatable :: y(:)
       real(wp) :: t
-      integer(i8) :: start, finish, rate
+      type(stopwatch) :: clock
       integer :: i
 
       n_rhs = 0
-      call system_clock(start, rate)
+      call clock%start()
       do i = 1, n_cases
          call new_scene(scene, swept(i), error)
          if (.not. allocated(error)) call new_motion(motion, scene, .false., error)
@@ -154,8 +154,7 @@ contains
          call integrator%finalize()
          deallocate (y, integrator)
       end do
-      call system_clock(finish)
-      seconds = real(finish - start, wp)/real(rate, wp)
+      seconds = clock%seconds()
    end subroutine by_one
 
    subroutine take(self, member)
@@ -211,19 +210,21 @@ contains
    !> The most that lanes can bring where both sides are bound by arithmetic: multiply-adds, a number or a vector at a time.
    subroutine peak()
       real(wp) :: x(n_streams), y(lanes, n_streams), one(n_rounds), many(n_rounds)
-      integer(i8) :: start, middle, finish, rate
+      type(stopwatch) :: clock
+      real(wp) :: seconds
       integer :: round
 
       call random_number(x)
       call random_number(y)
       do round = 1, n_rounds
-         call system_clock(start, rate)
+         call clock%start()
          call stream_numbers(x)
-         call system_clock(middle)
+         seconds = clock%seconds()
+         one(round) = 1.0e9_wp*seconds/(n_streams*stream_length)
+         call clock%start()
          call stream_vectors(y)
-         call system_clock(finish)
-         one(round) = 1.0e9_wp*real(middle - start, wp)/real(rate, wp)/(n_streams*stream_length)
-         many(round) = 1.0e9_wp*real(finish - middle, wp)/real(rate, wp)/(n_streams*stream_length*lanes)
+         seconds = clock%seconds()
+         many(round) = 1.0e9_wp*seconds/(n_streams*stream_length*lanes)
       end do
       if (any(x > 2.0_wp) .or. any(y > 2.0_wp)) error stop 'multiply-adds went wrong'
       write (*, '(/, a, 2(f7.4, a), f5.2)') 'multiply-add: ', median(one), ' ns, in lanes ', median(many), ' ns, ratio ', &
@@ -323,36 +324,19 @@ contains
       end do
    end subroutine kernels
 
-   !> The article's table-1 scene with n rods, without loads.
+   !> The article's table-1 scene with n rods in motion, without loads.
    function standard(n, kind) result(c)
       integer, intent(in) :: n
       character(len=*), intent(in) :: kind
       type(case_config) :: c
-      integer :: k
 
-      c%title = ''
-      c%spacecraft%mass = 122.5_wp
-      c%spacecraft%inertia = 122.5_wp*0.98_wp/12.0_wp
-      c%spacecraft%hinge_x = 0.35_wp
-      c%spacecraft%hinge_y = 0.35_wp
-      c%chain%n_rods = n
-      allocate (c%chain%length(n), source=1.5_wp)
-      allocate (c%chain%mass_per_length(n), source=1.6964600329384882_wp)
-      allocate (c%chain%bending_stiffness(n), source=13744.467859455345_wp)
-      allocate (c%chain%node_mass(n), source=0.5_wp)
-      allocate (c%chain%hinge_stiffness(0:n - 1), source=4000.0_wp)
-      allocate (c%chain%hinge_damping(0:n - 1), source=0.01_wp)
-      allocate (c%chain%kink(0:n - 1), source=0.0_wp)
-      allocate (c%initial%alpha(n), c%initial%beta(n), c%initial%alpha_rate(n), c%initial%beta_rate(n), source=0.0_wp)
-      c%initial%phi = [(0.1_wp*sin(0.7_wp*k), k=1, n)]
-      c%initial%phi_rate = [(0.1_wp*cos(0.7_wp*k), k=1, n)]
-      c%initial%omega = 0.3_wp
+      call table1_chain(c, n)
+      call set_in_motion(c)
       c%model%bending = kind
       if (index(kind, ',') > 0) then
          c%model%bending = kind(:index(kind, ',') - 1)
          c%model%inertia = 'lumped'
       end if
-      allocate (c%loads(0))
    end function standard
 
    subroutine set_up(item, kind, n)
@@ -381,56 +365,42 @@ contains
       type(subject), intent(inout) :: item
       integer, intent(in) :: slot !! 0: warm up
       real(wp) :: y(size(item%y)), ydot(size(item%y))
-      integer(i8) :: start, finish, rate
+      type(stopwatch) :: clock
+      real(wp) :: seconds
       integer :: j
       logical :: ok
 
       y = item%y
-      call system_clock(start, rate)
+      call clock%start()
       do j = 1, item%repeats
          call item%motion%rhs(0.3_wp, y, ydot, ok)
          y(1) = item%y(1) + 1.0e-12_wp*ydot(size(ydot))
       end do
-      call system_clock(finish)
+      seconds = clock%seconds()
       if (.not. ok) error stop 'right-hand side failed'
-      if (slot > 0) item%one(slot) = 1.0e9_wp*real(finish - start, wp)/real(rate, wp)/item%repeats
+      if (slot > 0) item%one(slot) = 1.0e9_wp*seconds/item%repeats
    end subroutine measure_one
 
    subroutine measure_many(item, slot)
       type(subject), intent(inout) :: item
       integer, intent(in) :: slot !! 0: warm up
       real(wp) :: q(size(item%q, 1), size(item%q, 2)), a(size(item%q, 1), size(item%q, 2)), t(lanes)
-      integer(i8) :: start, finish, rate
+      type(stopwatch) :: clock
+      real(wp) :: seconds
       integer :: j
       logical :: ok
 
       q = item%q
       t = 0.3_wp
-      call system_clock(start, rate)
+      call clock%start()
       do j = 1, item%repeats/2
          call item%motion%lane_accelerations(t, q, item%p, a, ok)
          q(:, 1) = item%q(:, 1) + 1.0e-12_wp*a(:, size(a, 2))
       end do
-      call system_clock(finish)
+      seconds = clock%seconds()
       if (.not. ok) error stop 'right-hand side failed'
-      if (slot > 0) item%many(slot) = 1.0e9_wp*real(finish - start, wp)/real(rate, wp)/(item%repeats/2)/lanes
+      if (slot > 0) item%many(slot) = 1.0e9_wp*seconds/(item%repeats/2)/lanes
    end subroutine measure_many
-
-   real(wp) function median(x)
-      real(wp), intent(in) :: x(:)
-      real(wp) :: sorted(size(x)), swap
-      integer :: a, b
-      sorted = x
-      do a = 2, size(x)
-         do b = a, 2, -1
-            if (sorted(b) >= sorted(b - 1)) exit
-            swap = sorted(b)
-            sorted(b) = sorted(b - 1)
-            sorted(b - 1) = swap
-         end do
-      end do
-      median = sorted((size(x) + 1)/2)
-   end function median
 
 end module rodyn_lanes_bench
 

@@ -4,8 +4,9 @@
 !>
 !>     tools/bench newton
 program bench_newton
-   use rodyn_kinds, only: wp, i8
+   use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
+   use rodyn_bench_support, only: median, set_in_motion, stopwatch, table1_chain
    use rodyn_case_config, only: case_config
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_motion, only: motion_type, new_motion, initial_state
@@ -39,27 +40,13 @@ contains
       type(case_config) :: c
       type(scene_type) :: scene
       type(error_type), allocatable :: error
-      integer :: k
 
-      c%title = ''
+      call table1_chain(c, n)
+      call set_in_motion(c)
+      c%initial%omega = 0.0_wp
+      c%chain%hinge_damping = 10.0_wp
       c%model%bending = kind
       if (kind == 'quasistatic') c%model%inertia = 'lumped'
-      c%spacecraft%mass = 122.5_wp
-      c%spacecraft%inertia = 10.0_wp
-      c%spacecraft%hinge_x = 0.35_wp
-      c%spacecraft%hinge_y = 0.35_wp
-      c%chain%n_rods = n
-      allocate (c%chain%length(n), source=1.5_wp)
-      allocate (c%chain%mass_per_length(n), source=1.7_wp)
-      allocate (c%chain%bending_stiffness(n), source=13744.0_wp)
-      allocate (c%chain%node_mass(n), source=0.5_wp)
-      allocate (c%chain%hinge_stiffness(0:n - 1), source=4000.0_wp)
-      allocate (c%chain%hinge_damping(0:n - 1), source=10.0_wp)
-      allocate (c%chain%kink(0:n - 1), source=0.0_wp)
-      allocate (c%initial%alpha(n), c%initial%beta(n), c%initial%alpha_rate(n), c%initial%beta_rate(n), source=0.0_wp)
-      c%initial%phi = [(0.05_wp*sin(0.7_wp*k), k=1, n)]
-      c%initial%phi_rate = [(0.1_wp*cos(0.7_wp*k), k=1, n)]
-      allocate (c%loads(0))
       call new_scene(scene, c, error)
       if (allocated(error)) error stop error%message
       call new_motion(motion, scene, .false., error)
@@ -99,13 +86,13 @@ contains
       real(wp), intent(in) :: y(:), right(:)
       integer, intent(in) :: which, repeats
       real(wp) :: x(size(y))
-      integer(i8) :: start, finish, rate
+      type(stopwatch) :: clock
       integer :: j
       logical :: ok
 
       x = right
       if (which == 5) call dense%reserve(size(y))
-      call system_clock(start, rate)
+      call clock%start()
       do j = 1, repeats
          select case (which)
          case (1)
@@ -123,8 +110,7 @@ contains
             call dense%solve(x)
          end select
       end do
-      call system_clock(finish)
-      timed = real(finish - start, wp)/real(rate, wp)/repeats
+      timed = clock%seconds()/repeats
    end function timed
 
    !> Some hundred steps of CVODE.
@@ -137,7 +123,7 @@ contains
       type(solver_options) :: options
       type(solver_statistics) :: stats
       real(wp) :: state(size(y)), t
-      integer(i8) :: start, finish, rate
+      type(stopwatch) :: clock
 
       options%rtol = 1.0e-6_wp
       options%atol = 1.0e-8_wp
@@ -145,26 +131,15 @@ contains
       call new_integrator(integrator, motion, 'bdf', options, error)
       if (allocated(error)) error stop error%message
       call integrator%set_stop(1.0e3_wp)
-      call system_clock(start, rate)
+      call clock%start()
       call integrator%start(0.0_wp, y, error)
       call integrator%advance(1.0e3_wp, state, t, error) ! ends with max_steps
-      call system_clock(finish)
+      per_step = clock%seconds()
       stats = integrator%statistics()
-      per_step = real(finish - start, wp)/real(rate, wp)/real(stats%n_steps, wp)
+      per_step = per_step/real(stats%n_steps, wp)
       rhs_per_step = real(stats%n_rhs, wp)/real(stats%n_steps, wp)
       jac_per_step = real(stats%n_jac, wp)/real(stats%n_steps, wp)
       call integrator%finalize()
    end subroutine whole_steps
-
-   real(wp) function median(x)
-      real(wp), intent(in) :: x(:)
-      real(wp) :: rest(size(x))
-      integer :: i
-      rest = x
-      do i = 1, size(x)/2
-         rest(maxloc(rest, dim=1)) = -huge(1.0_wp)
-      end do
-      median = maxval(rest)
-   end function median
 
 end program bench_newton

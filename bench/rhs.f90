@@ -5,8 +5,9 @@
 !>     tools/bench rhs
 program bench_rhs
    use, intrinsic :: iso_fortran_env, only: compiler_options
-   use rodyn_kinds, only: wp, i8
+   use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
+   use rodyn_bench_support, only: median, set_in_motion, stopwatch, table1_chain
    use rodyn_case_config, only: case_config, hinge_config, kink_config, load_config
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_motion, only: motion_type, new_motion, initial_state
@@ -102,30 +103,12 @@ program bench_rhs
 
 contains
 
-   !> The article's table-1 scene with n rods, without loads.
+   !> The article's table-1 scene with n rods in motion, without loads.
    function standard(n) result(c)
       integer, intent(in) :: n
       type(case_config) :: c
-      integer :: k
-
-      c%title = ''
-      c%spacecraft%mass = 122.5_wp
-      c%spacecraft%inertia = 122.5_wp*0.98_wp/12.0_wp
-      c%spacecraft%hinge_x = 0.35_wp
-      c%spacecraft%hinge_y = 0.35_wp
-      c%chain%n_rods = n
-      allocate (c%chain%length(n), source=1.5_wp)
-      allocate (c%chain%mass_per_length(n), source=1.6964600329384882_wp)
-      allocate (c%chain%bending_stiffness(n), source=13744.467859455345_wp)
-      allocate (c%chain%node_mass(n), source=0.5_wp)
-      allocate (c%chain%hinge_stiffness(0:n - 1), source=4000.0_wp)
-      allocate (c%chain%hinge_damping(0:n - 1), source=0.01_wp)
-      allocate (c%chain%kink(0:n - 1), source=0.0_wp)
-      allocate (c%initial%alpha(n), c%initial%beta(n), c%initial%alpha_rate(n), c%initial%beta_rate(n), source=0.0_wp)
-      c%initial%phi = [(0.1_wp*sin(0.7_wp*k), k=1, n)]
-      c%initial%phi_rate = [(0.1_wp*cos(0.7_wp*k), k=1, n)]
-      c%initial%omega = 0.3_wp
-      allocate (c%loads(0))
+      call table1_chain(c, n)
+      call set_in_motion(c)
    end function standard
 
    !> The same with rods that do not bend.
@@ -171,35 +154,20 @@ contains
       type(subject), intent(inout) :: item
       integer, intent(in) :: slot !! 0: warm up
       real(wp) :: y(size(item%y)), ydot(size(item%y))
-      integer(i8) :: start, finish, rate
+      type(stopwatch) :: clock
+      real(wp) :: seconds
       integer :: j
       logical :: ok
 
       y = item%y
-      call system_clock(start, rate)
+      call clock%start()
       do j = 1, item%repeats
          call item%motion%rhs(0.3_wp, y, ydot, ok)
          y(1) = item%y(1) + 1.0e-12_wp*ydot(size(ydot))
       end do
-      call system_clock(finish)
+      seconds = clock%seconds()
       if (.not. ok) error stop 'right-hand side failed'
-      if (slot > 0) item%nanoseconds(slot) = 1.0e9_wp*real(finish - start, wp)/real(rate, wp)/item%repeats
+      if (slot > 0) item%nanoseconds(slot) = 1.0e9_wp*seconds/item%repeats
    end subroutine measure
-
-   real(wp) function median(x)
-      real(wp), intent(in) :: x(:)
-      real(wp) :: sorted(size(x)), swap
-      integer :: a, b
-      sorted = x
-      do a = 2, size(x)
-         do b = a, 2, -1
-            if (sorted(b) >= sorted(b - 1)) exit
-            swap = sorted(b)
-            sorted(b) = sorted(b - 1)
-            sorted(b - 1) = swap
-         end do
-      end do
-      median = sorted((size(x) + 1)/2)
-   end function median
 
 end program bench_rhs

@@ -63,6 +63,7 @@ program bench_skips
    use, intrinsic :: iso_fortran_env, only: compiler_options
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type
+   use rodyn_bench_support, only: median, stopwatch
    use rodyn_bench_wasteful, only: integrals_in_loop, fresh_jacobians
    use rodyn_case_config, only: case_config, load_config
    use rodyn_case_reader, only: read_case
@@ -232,13 +233,14 @@ contains
       type(solver_statistics) :: stats
       type(error_type), allocatable :: error
       real(wp) :: y(size(item%y)), t
-      integer(i8) :: start, finish, rate
+      type(stopwatch) :: clock
+      real(wp) :: seconds
       integer :: j
 
       options%rtol = 1.0e-8_wp
       options%atol = 1.0e-10_wp
       call item%motion%dynamics%set_regime(0.0_wp, t_end)
-      call system_clock(start, rate)
+      call clock%start()
       call new_integrator(integrator, item%motion, trim(item%method), options, error)
       if (allocated(error)) error stop error%message
       call integrator%set_stop(t_end)
@@ -246,7 +248,7 @@ contains
       do j = 1, item%n_outputs
          if (.not. allocated(error)) call integrator%advance(t_end*j/item%n_outputs, y, t, error)
       end do
-      call system_clock(finish)
+      seconds = clock%seconds()
       if (allocated(error)) error stop error%message
       stats = integrator%statistics()
       item%n_rhs = stats%n_rhs
@@ -255,21 +257,7 @@ contains
          item%phi = y(scene%phi_at() + 1:scene%phi_at() + scene%n)
          if (scene%dynamic_bending) item%alpha_rate = y(n_q + scene%alpha_at() + 1:n_q + scene%alpha_at() + scene%n)
       end associate
-      if (slot > 0) item%seconds(slot) = real(finish - start, wp)/real(rate, wp)
+      if (slot > 0) item%seconds(slot) = seconds
    end subroutine run
-
-   real(wp) function median(x)
-      real(wp), intent(in) :: x(:)
-      real(wp) :: sorted(size(x))
-      logical :: taken(size(x))
-      integer :: a, b
-      taken = .false.
-      do a = 1, size(x)
-         b = minloc(x, dim=1, mask=.not. taken)
-         taken(b) = .true.
-         sorted(a) = x(b)
-      end do
-      median = sorted((size(x) + 1)/2)
-   end function median
 
 end program bench_skips

@@ -8,8 +8,9 @@
 !> postproc/stiffness.py draws the file.
 program bench_stiffness
    use, intrinsic :: iso_fortran_env, only: compiler_options
-   use rodyn_kinds, only: wp, i8
+   use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type
+   use rodyn_bench_support, only: stopwatch, table1_chain
    use rodyn_case_config, only: case_config, load_config
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_motion, only: motion_type, new_motion, initial_state
@@ -114,22 +115,10 @@ contains
       integer, intent(in) :: n
       real(wp), intent(in) :: bending, damper
 
-      c%title = ''
+      call table1_chain(c, n)
       c%t_end = t_end
-      c%spacecraft%mass = 122.5_wp
-      c%spacecraft%inertia = 122.5_wp*0.98_wp/12.0_wp
-      c%spacecraft%hinge_x = 0.35_wp
-      c%spacecraft%hinge_y = 0.35_wp
-      c%chain%n_rods = n
-      allocate (c%chain%length(n), source=1.5_wp)
-      allocate (c%chain%mass_per_length(n), source=1.6964600329384882_wp)
-      allocate (c%chain%bending_stiffness(n), source=bending*13744.467859455345_wp)
-      allocate (c%chain%node_mass(n), source=0.5_wp)
-      allocate (c%chain%hinge_stiffness(0:n - 1), source=4000.0_wp)
-      allocate (c%chain%hinge_damping(0:n - 1), source=damper*0.01_wp)
-      allocate (c%chain%kink(0:n - 1), source=0.0_wp)
-      allocate (c%initial%phi(n), c%initial%phi_rate(n), c%initial%alpha(n), c%initial%beta(n), c%initial%alpha_rate(n), &
-                c%initial%beta_rate(n), source=0.0_wp)
+      c%chain%bending_stiffness = bending*c%chain%bending_stiffness
+      c%chain%hinge_damping = damper*c%chain%hinge_damping
       c%loads = [load_config(component='M', value=1500.0_wp)]
    end subroutine chain
 
@@ -146,7 +135,7 @@ contains
       class(integrator_type), allocatable :: integrator
       type(error_type), allocatable :: error
       type(solver_options) :: options
-      integer(i8) :: start, finish, rate
+      type(stopwatch) :: clock
       integer :: chunk
 
       call new_scene(scene, config, error)
@@ -160,13 +149,12 @@ contains
       if (allocated(error)) error stop error%message
       call integrator%set_stop(t_end)
       reached = 0.0_wp
-      call system_clock(start, rate)
+      call clock%start()
       call integrator%start(0.0_wp, y, error)
       do chunk = 1, n_chunks
          if (allocated(error)) exit
          call integrator%advance(t_end*chunk/n_chunks, y, reached, error)
-         call system_clock(finish)
-         seconds = real(finish - start, wp)/real(rate, wp)
+         seconds = clock%seconds()
          if (seconds > seconds_allowed) exit
       end do
       stats = integrator%statistics()

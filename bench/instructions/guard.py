@@ -19,7 +19,9 @@ import shutil
 import subprocess
 import sys
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+from support import ROOT, benchmark  # noqa: E402
+
 COUNTS = pathlib.Path(__file__).with_name("counts.json")
 TOLERANCE = 1.01
 KINDS = {  # kind: two numbers of calls whose difference is counted
@@ -49,7 +51,7 @@ def build() -> str:
     march = {"RODYN_MARCH": "x86-64-v3"}
     same = command_output("tools/flags", "release", **march) == command_output("tools/flags", "release")
     stage = "release" if same else "guard"
-    return command_output("tools/bench", "--path", "instructions", RODYN_STAGE=stage, **march).split()[-1]
+    return benchmark("instructions", RODYN_STAGE=stage, **march)
 
 
 def instructions(program: str, kind: str, times: int) -> tuple[int, int]:

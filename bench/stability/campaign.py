@@ -41,12 +41,11 @@ from functools import partial
 import h5py
 import numpy as np
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
+sys.path[:0] = [str(pathlib.Path(__file__).resolve().parents[i]) for i in (0, 1)]
 import multipliers
 from ordinary_scenes import FAMILIES, Group, Typist, groups_of, text_of
+from support import ROOT, RODYN
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-RODYN = os.environ.get("RODYN", str(ROOT / "bin" / "rodyn"))
 RESULTS = ROOT / "results" / "stability" / "campaign.jsonl"
 DOCUMENT, MARK = ROOT / "docs" / "stability.md", "<!-- campaign -->\n"
 KEPT = ROOT / "build" / "campaign"

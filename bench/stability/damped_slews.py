@@ -13,13 +13,14 @@ from __future__ import annotations
 
 import argparse
 import pathlib
-import subprocess
 import sys
 import tempfile
 
 import numpy as np
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+from support import RODYN, run_case, solver  # noqa: E402
+
 COUNT, SEED = 320, 17
 RTOL = 1e-8
 
@@ -41,11 +42,10 @@ def run(folder: pathlib.Path, program: str, name: str, case: str, method: str, r
     """phi at all outputs, or what went wrong."""
     import xarray
 
-    source, result = folder / f"{name}.nml", folder / f"{name}.h5"
-    source.write_text(case + f"&solver method = '{method}', rtol = {rtol}, atol = {0.01 * rtol} /\n")
-    done = subprocess.run([program, "run", str(source), "--output", str(result), "--force", "--quiet"], capture_output=True, text=True)
-    if done.returncode != 0:
-        return None, done.stderr.strip()
+    result = folder / f"{name}.h5"
+    trouble = run_case(program, case + solver(method, rtol), result)
+    if trouble:
+        return None, trouble
     with xarray.open_dataset(result) as data:
         return data.phi.values, ""
 
@@ -54,7 +54,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", type=int, nargs="+", help="numbers of slews, from 0 on")
     parser.add_argument("--quick", action="store_true", help="no reference")
-    parser.add_argument("--program", default=str(ROOT / "bin/rodyn"))
+    parser.add_argument("--program", default=RODYN)
     options = parser.parse_args()
     numbers = options.only or range(COUNT)
     errors, failed = [], 0

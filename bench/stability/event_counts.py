@@ -12,13 +12,14 @@ from __future__ import annotations
 
 import argparse
 import pathlib
-import subprocess
 import sys
 import tempfile
 
 import numpy as np
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+from support import RODYN, run_case, solver  # noqa: E402
+
 COUNT, SEED = 300, 6
 METHODS = ("dop853", "erk", "bdf", "adams")
 
@@ -55,11 +56,10 @@ def events(folder: pathlib.Path, program: str, case: str, method: str, rtol: flo
     """(hinge, kind) of all events of each hinge in their order, or what went wrong."""
     import xarray
 
-    source, result = folder / "scene.nml", folder / "scene.h5"
-    source.write_text(case + f"&solver method = '{method}', rtol = {rtol}, atol = {0.01 * rtol} /\n")
-    done = subprocess.run([program, "run", str(source), "--output", str(result), "--force", "--quiet"], capture_output=True, text=True)
-    if done.returncode != 0:
-        return done.stderr.strip()
+    result = folder / "scene.h5"
+    trouble = run_case(program, case + solver(method, rtol), result)
+    if trouble:
+        return trouble
     with xarray.open_dataset(result, group="events") as data:
         kinds = [kind.decode() if isinstance(kind, bytes) else str(kind) for kind in data.kind.values]
         return sorted(zip(data.hinge.values.tolist(), kinds, strict=True), key=lambda event: event[0])
@@ -68,7 +68,7 @@ def events(folder: pathlib.Path, program: str, case: str, method: str, rtol: flo
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", type=int, nargs="+", help="numbers of scenes, from 0 on")
-    parser.add_argument("--program", default=str(ROOT / "bin/rodyn"))
+    parser.add_argument("--program", default=RODYN)
     options = parser.parse_args()
     numbers = options.only or range(COUNT)
     total = grazing = different = failed = 0

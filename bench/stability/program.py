@@ -8,11 +8,13 @@ import re
 import resource
 import signal
 import subprocess
+import sys
 import threading
 from dataclasses import dataclass
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-RODYN = os.environ.get("RODYN", str(ROOT / "bin" / "rodyn"))
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+from support import RODYN  # noqa: E402
+
 MEMORY = int(os.environ.get("RODYN_MEMORY") or 4 << 30)  # address space [bytes]; -1: no limit, which the sanitizers need
 FILES = 1 << 30         # of a file [bytes]
 LONGEST = 2.0           # processor time of a command [s]

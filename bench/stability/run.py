@@ -12,7 +12,6 @@ results/stability/PART.txt; the document has a mark for each table, and the text
 from __future__ import annotations
 
 import argparse
-import functools
 import pathlib
 import subprocess
 import sys
@@ -20,13 +19,15 @@ import time
 
 import numpy as np
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+BENCH = pathlib.Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(BENCH), str(BENCH / "wide"), str(BENCH.parent / "postproc")]
+from precisions import wide_program  # noqa: E402
+from support import ROOT, benchmark  # noqa: E402
+
 RESULTS = ROOT / "results" / "stability"
 DOCUMENT = ROOT / "docs" / "stability.md"
 PICTURE = ROOT / "docs" / "pictures" / "energy-drift"
 QUAD_ORDERS = ROOT / "bench" / "stability" / "quad_orders" / "quad_orders.f90"
-sys.path[:0] = [str(ROOT / "postproc"), str(ROOT / "bench" / "wide")]
-from precisions import wide_program  # noqa: E402
 
 ROD = [*(("1e6", method) for method in ("gauss:fixed", "gauss:1e-8", "dop853:1e-8", "erk8:1e-8", "adams:1e-8", "bdf:1e-8")),
        *(("1e5", f"erk{order}:1e-8") for order in (7, 6, 5)), ("3e4", "erk4:1e-8"), ("1e4", "erk3:1e-6"), ("1e4", "erk2:1e-5")]
@@ -36,27 +37,20 @@ RIGID = [("1e5", "gauss:fixed"), ("1e5", "gauss:1e-10"), ("1e5", "dop853:1e-10")
 PARTS = ["limits", "orders", "tolerances", "samples", "configurations", "extremes", "drift", "article"]
 
 
-@functools.cache
-def benchmark() -> str:
-    """Path of the compiled measurements."""
-    done = subprocess.run([ROOT / "tools/bench", "--path", "stability"], stdout=subprocess.PIPE, text=True, check=True)
-    return done.stdout.strip()
-
-
 def measure(part: str) -> None:
     """Run a part and keep what it prints."""
     RESULTS.mkdir(parents=True, exist_ok=True)
     if part == "article":
         text = article_runs()
     elif part == "drift":
-        program = benchmark()
+        program = benchmark("stability")
         jobs = [(scene, *job) for scene, some in (("rod", ROD), ("rigid", RIGID), ("flexible", FLEXIBLE)) for job in some]
         text = "".join(f"# {scene}\n" + output_of([program, "drift", scene, *job]) for scene, *job in jobs)
     else:
-        text = output_of([benchmark(), part])
+        text = output_of([benchmark("stability"), part])
     if part == "orders":
         program = wide_program("quadruple", QUAD_ORDERS, QUAD_ORDERS.parent)
-        (RESULTS / "orders_quad.txt").write_text(output_of([program], output_of([benchmark(), "tableaux"])))
+        (RESULTS / "orders_quad.txt").write_text(output_of([program], output_of([benchmark("stability"), "tableaux"])))
     (RESULTS / f"{part}.txt").write_text(text)
 
 

@@ -23,7 +23,9 @@ import time
 import h5py
 
 HERE = pathlib.Path(__file__).resolve().parent
-RODYN = os.environ.get("RODYN", str(HERE.parents[1] / "bin" / "rodyn"))
+sys.path.insert(0, str(HERE.parent))
+from support import RODYN  # noqa: E402
+
 ENVIRONMENT = os.environ | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
 
 

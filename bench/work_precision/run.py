@@ -38,10 +38,10 @@ import h5py
 import numpy as np
 
 HERE = pathlib.Path(__file__).resolve().parent
-ROOT = HERE.parents[1]
-sys.path[:0] = [str(ROOT / "postproc"), str(ROOT / "bench" / "wide")]
+sys.path[:0] = [str(HERE.parents[1] / "postproc"), str(HERE.parent / "wide"), str(HERE.parent)]
 from namelist import read_namelist  # noqa: E402
 from precisions import DIGITS, exact, wide_program  # noqa: E402
+from support import ROOT, benchmark  # noqa: E402
 
 SCENES = ["table1", "table1_30s", "example", "beam", "stiff", "damped", "lumped", "rigid", "chain_16", "chain_64", "chain_256",
           "chain_1024"]
@@ -162,7 +162,7 @@ class Benchmark:
         self.budget = arguments.budget or min(6.0, max(0.5, share / 40))  # lines that are hopeless must leave time for the others
         self.tolerances = QUICK_TOLERANCES if self.quick else TOLERANCES
         python = ROOT / "bench" / "peers" / ".venv" / "bin" / "python"
-        self.workers = {"rodyn": Worker("rodyn", [build("work_precision")])}
+        self.workers = {"rodyn": Worker("rodyn", [benchmark("work_precision")])}
         self.peers: dict[str, str] = {}  # version, or why it is absent
         self.results: dict[str, list[Computation]] = {}
         self.attributes: dict[str, dict[str, Any]] = {}
@@ -566,17 +566,9 @@ def scene_path(scene: str) -> str:
     return str(HERE / f"{scene}.nml")
 
 
-def build(benchmark: str) -> str:
-    """Path of a compiled benchmark."""
-    done = subprocess.run([ROOT / "tools/bench", "--path", benchmark], capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise SystemExit(f"{benchmark} could not be built:\n{done.stderr[-2000:]}")
-    return done.stdout.strip()
-
-
 def quad_reference(base: dict[str, Any], steps: int) -> dict[str, np.ndarray]:
     """phi and alpha' (probe, rod) by inertial coordinates, Jacobians at Gauss points and an extrapolated midpoint rule."""
-    command = [build("stability"), "reference", base["scene"], str(steps), *map(repr, base["probe_times"])]
+    command = [benchmark("stability"), "reference", base["scene"], str(steps), *map(repr, base["probe_times"])]
     text = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     values = np.array([[float(word) for word in line.split()] for line in text.splitlines()])
     n = read_namelist(pathlib.Path(base["scene"]).read_text())["chain"][0]["n_rods"]
