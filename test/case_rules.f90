@@ -252,8 +252,8 @@ contains
       call expect_faults(error, &
          valid//'&load law = ''step'', rate = 1 /'//nl//&
          '&model inertia = ''lumped'', bending = ''elastic'' /'//nl, &
-         'c.nml:3: &load law = ''step'': must be ''constant'', ''table'', ''sine_squared'' or '//&
-         '''smooth_step'''//nl//&
+         'c.nml:3: &load law = ''step'': must be ''constant'', ''table'', ''sine_squared'', '//&
+         '''smooth_step'', ''ramp'' or ''sine'''//nl//&
          'c.nml:4: &model bending = ''elastic'': must be ''dynamic'', ''quasistatic'' or ''rigid''')
    end subroutine no_echo
 

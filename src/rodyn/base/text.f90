@@ -162,15 +162,18 @@ contains
    !> Is a word in a list such as 'free|fixed'?
    pure logical function has_word(list, text)
       character(len=*), intent(in) :: list, text
-      integer :: first, length
+      integer :: first, i, last
 
+      last = len_trim(list)
       first = 1
-      do
-         length = index(list(first:), '|') - 1
-         if (length < 0) length = len_trim(list(first:))
-         has_word = list(first:first + length - 1) == text
-         first = first + length + 1
-         if (has_word .or. first > len_trim(list)) return
+      do i = 1, last + 1
+         if (i <= last) then
+            if (list(i:i) /= '|') cycle
+         end if
+         has_word = i - first == len_trim(text)
+         if (has_word) has_word = list(first:i - 1) == text(:i - first)
+         if (has_word) return
+         first = i + 1
       end do
    end function has_word
 

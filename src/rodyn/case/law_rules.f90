@@ -39,12 +39,14 @@ contains
       integer, intent(in) :: i
       character(len=*), intent(in) :: law
       character(len=*), intent(in) :: keys(:) !! of the group, which some laws do not take
+      character(len=:), allocatable :: takes
       logical :: taken
       integer :: k
 
       if (.not. judge%is_sound(group, i, 'law')) return
+      takes = keys_of_law(law)
       do k = 1, size(keys)
-         taken = has_word(keys_of_law(law), keys(k))
+         taken = has_word(takes, keys(k))
          if (taken .and. has_word(need_not_be_given, keys(k))) cycle
          if (judge%is_given(group, i, trim(keys(k))) .eqv. taken) cycle
          if (taken) then
