@@ -55,6 +55,7 @@ contains
       call initial_state(motion, config%initial, y)
       if (config%output%ledger) y(size(y) - 1:) = [5.0_wp, 6.0_wp]
       row = new_row(layout_of(config))
+      call fill_row(motion, 0.0_wp, y, 0.0_wp, row) ! names are compared in the first row alone
       row%values = given
       call fill_row(motion, 1.5_wp, y, 4.0_wp, row)
    end subroutine read_off

@@ -93,6 +93,7 @@ module rodyn_quantities
       real(wp) :: time = 0.0_wp           !! [s]
       real(wp), allocatable :: values(:)  !! (layout%n_values)
       integer, private :: next = 1        !! quantity to be filled in
+      logical, private :: compared = .false. !! all names, in the order of `fill_row`
    end type row_type
 
 contains
@@ -227,8 +228,10 @@ contains
          call put(row, 'phi_rate', p(scene%phi_at() + 1:scene%phi_at() + n))
          call put(row, 'alpha_rate', x(:, 3))
          call put(row, 'beta_rate', x(:, 4))
-         call put(row, 'bubble', q(scene%bend_at(3) + 1:scene%bend_at(3) + b))
-         call put(row, 'bubble_rate', p(scene%bend_at(3) + 1:scene%bend_at(3) + b))
+         if (row%layout%has(third_shape)) then
+            call put(row, 'bubble', q(scene%bend_at(3) + 1:scene%bend_at(3) + b))
+            call put(row, 'bubble_rate', p(scene%bend_at(3) + 1:scene%bend_at(3) + b))
+         end if
          call put(row, 'velocity_x', p(1:f))
          call put(row, 'velocity_y', p(2:1 + f))
          call put(row, 'omega', p(3:2 + f))
@@ -253,9 +256,11 @@ contains
             call put(row, 'hinge_rate', x(:, 2))
          end if
       end associate
+      row%compared = row%next > size(row%layout%quantities)
    end subroutine fill_row
 
-   !> The next quantity of a row, if it is this one; otherwise the row has no place for this one. None: it stays zero.
+   !> The next quantity of a row; none: it stays zero. Whether it is the one of this name is compared in the first row alone, which
+   !> takes longer than all the rest.
    pure subroutine put(row, name, x)
       type(row_type), intent(inout) :: row
       character(len=*), intent(in) :: name
@@ -263,7 +268,9 @@ contains
 
       if (row%next > size(row%layout%quantities)) return
       associate (place => row%layout%quantities(row%next))
-         if (place%name /= name) return
+         if (.not. row%compared) then
+            if (place%name /= name) return
+         end if
          row%values(place%first:place%first + size(x) - 1) = x
       end associate
       row%next = row%next + 1
