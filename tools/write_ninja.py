@@ -22,6 +22,9 @@ rule compile
   command = {compiler} {flags} $more -I{stage}/include -J$modules -c $in -o $out
   description = $in
   restat = 1
+rule compile_c
+  command = {compiler} -O2 -c $in -o $out
+  description = $in
 rule archive
   command = rm -f $out && ar rcs $out $in
   description = $out
@@ -42,6 +45,9 @@ def main() -> None:
     modules_of = {"src": f"{stage}/include", "app": f"{stage}/include", "test": f"{stage}/objects"}
     module_file = {name: f"{modules_of[path.parts[0]]}/{name}.mod" for path, text in texts.items() for name in MODULE.findall(text)}
     members: dict[str, list[str]] = {folder: [] for folder in ARCHIVES}
+    in_c = {f"{stage}/objects/app_{path.name}.o": path.name for path in sorted(ROOT.glob("app/*.c"))}
+    for made, name in in_c.items():
+        print(f"build {made}: compile_c app/{name}")
     for path, text in texts.items():
         folder = path.parts[0]
         made = f"{stage}/objects/{'_'.join(path.parts)}.o"
@@ -52,8 +58,8 @@ def main() -> None:
         print(f"  modules = {modules_of[folder]}")
         print("  more = -O0" * (folder == "test"))
         if str(path) in PROGRAMS:
-            archives = [ARCHIVES[other] for other in ("test", "src") if other in (folder, "src")]
-            print(f"build {stage}/{PROGRAMS[str(path)]}: link {made} {' '.join(f'{stage}/{archive}' for archive in archives)}")
+            parts = [made, *in_c] if folder == "app" else [made, f"{stage}/{ARCHIVES['test']}"]
+            print(f"build {stage}/{PROGRAMS[str(path)]}: link {' '.join(parts)} {stage}/{ARCHIVES['src']}")
         else:
             members[folder].append(made)
     for folder, objects in members.items():
