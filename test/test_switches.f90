@@ -8,7 +8,7 @@ module test_switches
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_switch_times, only: add_switches, interval_ends, same_time
    use rodyn_text, only: word, word_count
-   use rodyn_time_law, only: law_config, law_words, new_time_law, time_law
+   use rodyn_time_law, only: law_config, law_words, new_time_law, time_law, value_at
    use rodyn_user_load, only: user_load
    use test_testing, only: unittest, new_test, check, check_close
    use test_trajectories, only: trajectory, integrate
@@ -334,9 +334,9 @@ contains
          do serves = 1, 2
             call new_time_law(law, word(law_words, i), given, of_motion=serves == 2, hold=.false.)
             call law%take_piece(t, piece)
-            before = piece%value_at(t - h)
-            now = piece%value_at(t)
-            after = piece%value_at(t + h)
+            before = value_at(piece, t - h)
+            now = value_at(piece, t)
+            after = value_at(piece, t + h)
             call check_close(error, piece%motion_at(t), [now, (after - before)/(2.0_wp*h), (after - 2.0_wp*now + before)/h**2], &
                              tolerance, word(law_words, i))
             if (allocated(error)) return

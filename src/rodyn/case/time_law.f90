@@ -10,7 +10,7 @@ module rodyn_time_law
    use rodyn_switch_times, only: last_before, same_time
    implicit none (type, external)
    private
-   public :: law_config, time_law, new_time_law, law_times, law_words, motion_words, keys_of_law, moves_smoothly
+   public :: law_config, time_law, new_time_law, law_times, law_words, motion_words, keys_of_law, moves_smoothly, value_at
 
    !> What a namelist group gives of its law, but for its name, whose default is the group's own.
    type :: law_config
@@ -64,7 +64,6 @@ module rodyn_time_law
       procedure :: is_zero
       procedure :: drops
       procedure :: take_piece
-      procedure :: value_at
       procedure :: motion_at
       procedure :: resting_at
    end type time_law
@@ -254,9 +253,9 @@ contains
 
    !> Value of a piece. It stands apart from the derivatives, which cost more, for laws that are evaluated again and again.
    pure real(wp) function value_at(self, t)
-      class(time_law), intent(in) :: self
+      type(time_law), intent(in) :: self
       real(wp), intent(in) :: t !! [s]
-      real(wp) :: s, x(3)
+      real(wp) :: s
 
       select case (self%law)
       case (law_constant)
@@ -266,13 +265,21 @@ contains
       case (law_sine_squared)
          value_at = self%value*sin(self%rate*t)**2
       case (law_smooth_step)
-         s = part_of_rise(self, t)
+         s = min(max((t - self%t_start)/self%span, 0.0_wp), 1.0_wp)
          value_at = self%value*s**3*(10.0_wp - s*(15.0_wp - 6.0_wp*s))
       case default
-         x = self%motion_at(t)
-         value_at = x(1)
+         value_at = first_of(self, t)
       end select
    end function value_at
+
+   !> Value of a law that has no shorter way to it.
+   pure real(wp) function first_of(self, t)
+      type(time_law), intent(in) :: self
+      real(wp), intent(in) :: t !! [s]
+      real(wp) :: x(3)
+      x = self%motion_at(t)
+      first_of = x(1)
+   end function first_of
 
    !> Value of a piece and its first two derivatives in time.
    pure function motion_at(self, t) result(x)
@@ -285,13 +292,13 @@ contains
       case (law_constant)
          x = [self%value, 0.0_wp, 0.0_wp]
       case (law_table)
-         x = [self%value_at(t), self%change/self%span, 0.0_wp]
+         x = [self%value + self%change*((t - self%t_start)/self%span), self%change/self%span, 0.0_wp]
       case (law_sine_squared)
          associate (phase => self%rate*t, w => self%rate)
             x = [sin(phase)**2, w*sin(2.0_wp*phase), 2.0_wp*w**2*cos(2.0_wp*phase)]*self%value
          end associate
       case (law_smooth_step) ! value and two derivatives vanish at the start, rate and acceleration at the end
-         s = part_of_rise(self, t)
+         s = min(max((t - self%t_start)/self%span, 0.0_wp), 1.0_wp)
          x = [s**3*(10.0_wp - s*(15.0_wp - 6.0_wp*s)), 30.0_wp*(s*(1.0_wp - s))**2/self%span, &
               60.0_wp*s*(1.0_wp - s)*(1.0_wp - 2.0_wp*s)/self%span**2]*self%value
       case (law_ramp)
@@ -304,13 +311,6 @@ contains
          x = spline_value(self%times, self%values, self%bend, t)
       end select
    end function motion_at
-
-   !> How far a smooth step has risen in time, 0 to 1.
-   pure real(wp) function part_of_rise(self, t)
-      class(time_law), intent(in) :: self
-      real(wp), intent(in) :: t !! [s]
-      part_of_rise = min(max((t - self%t_start)/self%span, 0.0_wp), 1.0_wp)
-   end function part_of_rise
 
    !> Cubic spline from its values and second derivatives at the knots.
    pure function spline_value(times, values, bend, t) result(x)

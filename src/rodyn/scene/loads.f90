@@ -7,7 +7,7 @@ module rodyn_loads
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: load_config
    use rodyn_switch_times, only: middle_of
-   use rodyn_time_law, only: time_law, new_time_law
+   use rodyn_time_law, only: time_law, new_time_law, value_at
    implicit none (type, external)
    private
    public :: load_set, new_load_set, load_regime, new_load_regime, load_forces, evaluate_loads
@@ -86,9 +86,9 @@ contains
                n_varying = n_varying + 1
             else if (piece%node > 0) then
                regime%constant_node(piece%component, piece%node) = regime%constant_node(piece%component, piece%node) &
-                                                                   + piece%law%value_at(middle)
+                                                                   + value_at(piece%law, middle)
             else
-               regime%constant_base(piece%component) = regime%constant_base(piece%component) + piece%law%value_at(middle)
+               regime%constant_base(piece%component) = regime%constant_base(piece%component) + value_at(piece%law, middle)
             end if
          end associate
       end do
@@ -101,6 +101,7 @@ contains
       type(load_regime), intent(in) :: regime
       real(wp), intent(in) :: t        !! [s], within the regime
       logical, intent(in) :: fresh     !! also copy the constant loads
+      real(wp) :: value
       integer :: i
 
       if (fresh) then
@@ -109,17 +110,20 @@ contains
       end if
       if (size(regime%varying) == 0) return
       forces%base = regime%constant_base
-      do i = 1, size(regime%varying)
-         associate (node => regime%varying(i)%node)
-            if (node > 0) forces%node(:, node) = regime%constant_node(:, node)
-         end associate
-      end do
+      if (regime%on_nodes) then
+         do i = 1, size(regime%varying)
+            associate (node => regime%varying(i)%node)
+               if (node > 0) forces%node(:, node) = regime%constant_node(:, node)
+            end associate
+         end do
+      end if
       do i = 1, size(regime%varying)
          associate (load => regime%varying(i), component => regime%varying(i)%component)
+            value = value_at(load%law, t)
             if (load%node > 0) then
-               forces%node(component, load%node) = forces%node(component, load%node) + load%law%value_at(t)
+               forces%node(component, load%node) = forces%node(component, load%node) + value
             else
-               forces%base(component) = forces%base(component) + load%law%value_at(t)
+               forces%base(component) = forces%base(component) + value
             end if
          end associate
       end do
