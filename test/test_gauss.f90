@@ -261,12 +261,12 @@ contains
       modes%n = n
       modes%weight = 0.7_wp
       modes%square = [900.0_wp, 30.0_wp, 5.0_wp]
-      modes%grip = reshape([0.2_wp, 0.4_wp, -0.3_wp, -0.1_wp, 0.3_wp, 0.8_wp], [n, 2])
-      modes%grip_t = transpose(modes%grip)
+      modes%influence = reshape([0.2_wp, 0.4_wp, -0.3_wp, -0.1_wp, 0.3_wp, 0.8_wp], [n, 2])
+      modes%influence_t = transpose(modes%influence)
       residuals = reshape([(sin(3.0_wp*i), i=1, m)], [lanes, n])
       do i = 1, n
          do j = 1, n
-            d_ij = modes%square(i)*dot_product(modes%grip_t(:, i), modes%grip_t(:, j))
+            d_ij = modes%square(i)*dot_product(modes%influence_t(:, i), modes%influence_t(:, j))
             k_ij = -modes%weight*d_ij
             if (i == j) k_ij = k_ij + modes%square(i)
             matrix((i - 1)*lanes + 1:i*lanes, (j - 1)*lanes + 1:j*lanes) = h*d_ij*rule%a + h**2*k_ij*rule%a2
@@ -281,11 +281,11 @@ contains
       call modal%answer(rule, modes, residuals, reply)
       call check(error, info == 0 .and. maxval(abs(reply + residuals - reshape(x, [lanes, n]))) < 1.0e-9_wp, 'coupled')
       if (allocated(error)) return
-      modes%grip = 0.0_wp
-      modes%grip(1, 1) = 0.3_wp
-      modes%grip(3, 2) = 0.5_wp
-      modes%grip_t = transpose(modes%grip)
-      modes%damping = modes%square*sum(modes%grip**2, dim=2)
+      modes%influence = 0.0_wp
+      modes%influence(1, 1) = 0.3_wp
+      modes%influence(3, 2) = 0.5_wp
+      modes%influence_t = transpose(modes%influence)
+      modes%damping = modes%square*sum(modes%influence**2, dim=2)
       modes%omega_2 = modes%square - modes%weight*modes%damping
       call modal%prepare(rule, modes, h, .true.)
       call modal%answer(rule, modes, residuals, reply)
@@ -538,8 +538,8 @@ contains
       call modes%reserve(2, 2, 0, 1)
       modes%n = 2
       modes%square = [1.0_wp, 1.0e4_wp]
-      modes%grip(:, 1) = [0.2_wp, 0.2_wp]
-      modes%grip_t = transpose(modes%grip)
+      modes%influence(:, 1) = [0.2_wp, 0.2_wp]
+      modes%influence_t = transpose(modes%influence)
       call modes%bound_coupling()
       do i = -5, 9
          weight = 10.0_wp**(0.5_wp*i)
@@ -547,7 +547,7 @@ contains
          call check(error, modes%couples(weight) .eqv. off_diagonal > 0.03_wp, 'coupled')
          if (allocated(error)) return
       end do
-      modes%grip_t = 0.8_wp*modes%grip_t ! now the largest is 0.025
+      modes%influence_t = 0.8_wp*modes%influence_t ! now the largest is 0.025
       call modes%bound_coupling()
       call check(error, .not. modes%couples(10.0_wp), 'not coupled')
    end subroutine test_coupling_of_steps

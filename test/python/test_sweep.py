@@ -875,7 +875,7 @@ GOOD = "&axis key = 'chain.hinge_stiffness(0)', values = 1e3, 2e3 /\n"
 
 
 @pytest.mark.parametrize("combine", ["grid", "zip"])
-def test_a_bad_axis_is_blamed_alone(here, combine):
+def test_a_bad_axis_is_reported_alone(here, combine):
     """Also where its first value is the bad one, with which all values of the others would be tried."""
     bad = "&axis key = 'model.gauss_points', values = 1, 4 /\n"
     for order in (bad + GOOD, GOOD + bad):

@@ -1,7 +1,7 @@
 !> Room for a file to grow, made sure of before it is needed: so a full disk, a quota or a limit of file sizes is met between
 !> two writes, and not within one.
 !>
-!> File systems that copy on writing (btrfs, ZFS, bcachefs) need room anew for what is overwritten, and for their own trees: some
+!> File systems that copy on writing (btrfs, ZFS, bcachefs) need new space for what is overwritten, and for their own trees: some
 !> is left over there. Those that cannot set bytes aside (NFS before 4.2, FUSE), and may have quotas that only a write meets, are
 !> tried with zeros.
 !>

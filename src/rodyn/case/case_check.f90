@@ -10,7 +10,7 @@ module rodyn_case_check
    use rodyn_errors, only: error_type
    use rodyn_faults, only: fault_list
    use rodyn_field_visitor, only: field_visitor
-   use rodyn_key_judge, only: key_judge
+   use rodyn_key_checker, only: key_checker
    use rodyn_schema, only: schema_extent, schema_group, schema_row, name_length, any_list, count_rule, matching_word, rule_text, &
       satisfies, up_to
    use rodyn_text, only: has_word, plain_text, printable, quoted, to_text, word
@@ -27,7 +27,7 @@ module rodyn_case_check
    end type unsound_key
 
    !> Faults of a case.
-   type, extends(key_judge) :: case_judge
+   type, extends(key_checker) :: case_checker
       type(case_config), pointer :: given => null()  !! says what was given
       type(case_config), pointer :: config => null() !! with what was left out
       type(fault_list) :: faults
@@ -35,12 +35,12 @@ module rodyn_case_check
    contains
       procedure :: is_given
       procedure :: is_sound
-      procedure :: blame
-   end type case_judge
+      procedure :: report
+   end type case_checker
 
    !> Holds each value against the rule of its key.
    type, extends(field_visitor) :: value_checker
-      type(case_judge), pointer :: judge => null()
+      type(case_checker), pointer :: checker => null()
       type(schema_extent) :: extents(3)
       character(len=16) :: group = ''
       integer :: instance = 1
@@ -67,32 +67,32 @@ contains
       type(case_config), target, intent(out) :: config
       type(error_type), allocatable, intent(out) :: error
       type(case_config), target :: spelt !! what was given, its words as in the table
-      type(case_judge), target :: judge
-      type(value_checker) :: checker
+      type(case_checker), target :: checker
+      type(value_checker) :: visitor
 
       config = given
-      judge%given => given
-      judge%config => config
-      checker%judge => judge
-      checker%extents = case_extents(config%chain%n_rods)
-      call visit_case(checker, config)
+      checker%given => given
+      checker%config => config
+      visitor%checker => checker
+      visitor%extents = case_extents(config%chain%n_rods)
+      call visit_case(visitor, config)
       spelt = config
-      judge%given => spelt
-      call complete_case(judge, config)
-      call check_case(judge, config)
-      call judge%faults%to_error('', error)
+      checker%given => spelt
+      call complete_case(checker, config)
+      call check_case(checker, config)
+      call checker%faults%to_error('', error)
    end subroutine sound_case
 
    !> Defaults that come from other keys, as far as these are sound. A table of a kink has its own times.
-   subroutine complete_case(judge, config)
-      class(key_judge), intent(in) :: judge
+   subroutine complete_case(checker, config)
+      class(key_checker), intent(in) :: checker
       type(case_config), intent(inout) :: config !! lists allocated
       integer :: i
 
       do i = 1, size(config%profiles)
          if (config%profiles(i)%last_rod == blank_profile%last_rod) config%profiles(i)%last_rod = config%chain%n_rods
       end do
-      if (.not. judge%is_sound('case', 1, 't_end')) return
+      if (.not. checker%is_sound('case', 1, 't_end')) return
       do i = 1, size(config%loads)
          associate (load => config%loads(i))
             if (is_none(load%t_end)) load%t_end = end_by_default(load%t_start, config%t_end)
@@ -127,7 +127,7 @@ contains
 
    !> Does the case give the key? Only the keys that rules ask for.
    logical function is_given(self, group, instance, key) result(given)
-      class(case_judge), intent(in) :: self
+      class(case_checker), intent(in) :: self
       character(len=*), intent(in) :: group, key
       integer, intent(in) :: instance
 
@@ -254,7 +254,7 @@ contains
    end function hinge_gives
 
    logical function is_sound(self, group, instance, key) result(sound)
-      class(case_judge), intent(in) :: self
+      class(case_checker), intent(in) :: self
       character(len=*), intent(in) :: group, key
       integer, intent(in) :: instance
       sound = .true.
@@ -263,8 +263,8 @@ contains
    end function is_sound
 
    !> Note a fault: '&group key = value: rule'.
-   subroutine blame(self, group, instance, key, rule)
-      class(case_judge), intent(inout) :: self
+   subroutine report(self, group, instance, key, rule)
+      class(case_checker), intent(inout) :: self
       character(len=*), intent(in) :: group, key, rule
       integer, intent(in) :: instance
 
@@ -275,7 +275,7 @@ contains
       else
          call self%faults%add(0, name_of(group, instance)//' '//key//value_shown(self%config, group, instance, key)//': '//rule)
       end if
-   end subroutine blame
+   end subroutine report
 
    !> '&load', and from the second on '&load(2)', as an axis of a sweep has it.
    pure function name_of(group, instance) result(name)
@@ -294,11 +294,11 @@ contains
       character(len=*), intent(in) :: value !! ' = value', or nothing
       character(len=*), intent(in) :: rule
 
-      associate (judge => self%judge)
-         call judge%faults%add(0, name_of(self%group, self%instance)//' '//trim(row%key)//where//value//': '//rule)
-         if (.not. allocated(judge%unsound)) allocate (judge%unsound(0))
-         if (judge%is_sound(trim(self%group), self%instance, trim(row%key))) &
-            judge%unsound = [judge%unsound, unsound_key(self%group, row%key, self%instance)]
+      associate (checker => self%checker)
+         call checker%faults%add(0, name_of(self%group, self%instance)//' '//trim(row%key)//where//value//': '//rule)
+         if (.not. allocated(checker%unsound)) allocate (checker%unsound(0))
+         if (checker%is_sound(trim(self%group), self%instance, trim(row%key))) &
+            checker%unsound = [checker%unsound, unsound_key(self%group, row%key, self%instance)]
       end associate
    end subroutine reject
 
@@ -345,7 +345,7 @@ contains
       type(schema_row), intent(in) :: row
 
       if (satisfies(row, real(x, wp))) return
-      if (row%default == 'depends' .and. .not. self%judge%is_given(trim(self%group), self%instance, trim(row%key))) return
+      if (row%default == 'depends' .and. .not. self%checker%is_given(trim(self%group), self%instance, trim(row%key))) return
       call reject(self, row, '', ' = '//to_text(x), rule_text(row))
    end subroutine integer_field
 
@@ -392,7 +392,7 @@ contains
       integer :: first, last
 
       last = 0
-      do while (last < size(x) .and. .not. self%judge%faults%full())
+      do while (last < size(x) .and. .not. self%checker%faults%full())
          first = last + 1
          last = first
          if (passes_rule(x(first))) cycle

@@ -2,7 +2,7 @@
 module rodyn_case_rules
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: case_config, load_config, profile_config
-   use rodyn_key_judge, only: key_judge, no_such
+   use rodyn_key_checker, only: key_checker, no_such
    use rodyn_hinge_rules, only: check_moving_hinges
    use rodyn_methods, only: list_of_methods, method_named, method_type, methods, order_rule
    use rodyn_law_rules, only: check_law
@@ -15,36 +15,36 @@ module rodyn_case_rules
 contains
 
    !> Note everything that is wrong with the case as a whole.
-   subroutine check_case(judge, config)
-      class(key_judge), intent(inout) :: judge
+   subroutine check_case(checker, config)
+      class(key_checker), intent(inout) :: checker
       type(case_config), intent(in) :: config !! its lists are allocated
       integer :: i
 
-      call check_spacecraft(judge, config)
-      call check_model(judge, config)
-      call check_bending(judge, config)
-      call check_masses(judge, config)
-      call check_solver(judge, config)
+      call check_spacecraft(checker, config)
+      call check_model(checker, config)
+      call check_bending(checker, config)
+      call check_masses(checker, config)
+      call check_solver(checker, config)
       do i = 1, size(config%profiles)
-         call check_profile_rods(judge, i, config%profiles(i), config%chain%n_rods)
-         call check_profile(judge, i, config%profiles(i), config%model%bending == 'quasistatic')
+         call check_profile_rods(checker, i, config%profiles(i), config%chain%n_rods)
+         call check_profile(checker, i, config%profiles(i), config%model%bending == 'quasistatic')
       end do
       do i = 1, size(config%loads)
-         call check_target(judge, i, config%loads(i), config%chain%n_rods)
-         call check_law(judge, 'load', i, config%loads(i)%law, config%loads(i), of_motion=.false.)
+         call check_target(checker, i, config%loads(i), config%chain%n_rods)
+         call check_law(checker, 'load', i, config%loads(i)%law, config%loads(i), of_motion=.false.)
       end do
-      call check_moving_hinges(judge, config)
+      call check_moving_hinges(checker, config)
    end subroutine check_case
 
    !> A free spacecraft has mass and inertia; a fixed one does not move.
-   subroutine check_spacecraft(judge, config)
-      class(key_judge), intent(inout) :: judge
+   subroutine check_spacecraft(checker, config)
+      class(key_checker), intent(inout) :: checker
       type(case_config), intent(in) :: config
 
-      if (.not. judge%is_sound('spacecraft', 1, 'motion')) return
+      if (.not. checker%is_sound('spacecraft', 1, 'motion')) return
       if (config%spacecraft%motion == 'free') then
-         call judge%require('spacecraft', 1, 'mass', "when motion = 'free'")
-         call judge%require('spacecraft', 1, 'inertia', "when motion = 'free'")
+         call checker%require('spacecraft', 1, 'mass', "when motion = 'free'")
+         call checker%require('spacecraft', 1, 'inertia', "when motion = 'free'")
          return
       end if
       call require_zero('velocity_x', config%initial%velocity_x)
@@ -59,45 +59,45 @@ contains
       subroutine require_zero(key, x)
          character(len=*), intent(in) :: key
          real(wp), intent(in) :: x
-         if (abs(x) > 0.0_wp) call judge%blame('initial', 1, key, "must be 0 when motion = 'fixed'")
+         if (abs(x) > 0.0_wp) call checker%report('initial', 1, key, "must be 0 when motion = 'fixed'")
       end subroutine require_zero
 
    end subroutine check_spacecraft
 
    !> docs/model.md sec. 5: which bending goes with which inertia.
-   subroutine check_model(judge, config)
-      class(key_judge), intent(inout) :: judge
+   subroutine check_model(checker, config)
+      class(key_checker), intent(inout) :: checker
       type(case_config), intent(in) :: config
       character(len=:), allocatable :: key
 
-      if (.not. (judge%is_sound('model', 1, 'bending') .and. judge%is_sound('model', 1, 'inertia'))) return
+      if (.not. (checker%is_sound('model', 1, 'bending') .and. checker%is_sound('model', 1, 'inertia'))) return
       key = 'bending'
-      if (.not. judge%is_given('model', 1, key)) key = 'inertia'
+      if (.not. checker%is_given('model', 1, key)) key = 'inertia'
       if (config%model%bending == 'dynamic' .and. config%model%inertia == 'lumped') then
-         call judge%blame('model', 1, key, "bending = 'dynamic' is not possible with inertia = 'lumped'; " &
+         call checker%report('model', 1, key, "bending = 'dynamic' is not possible with inertia = 'lumped'; " &
             //"take 'quasistatic' or 'rigid'")
       else if (config%model%bending == 'quasistatic' .and. config%model%inertia == 'distributed') then
-         call judge%blame('model', 1, key, &
+         call checker%report('model', 1, key, &
             "bending = 'quasistatic' is not possible with inertia = 'distributed'; "//&
             "take 'dynamic' or 'rigid', or inertia = 'lumped'")
       end if
-      if (.not. judge%is_sound('model', 1, 'bending_shapes') .or. config%model%bending_shapes /= 3) return
+      if (.not. checker%is_sound('model', 1, 'bending_shapes') .or. config%model%bending_shapes /= 3) return
       if (config%model%bending /= 'dynamic') then
-         call judge%blame('model', 1, 'bending_shapes', "3 is possible with bending = 'dynamic' only")
-      else if (judge%is_sound('model', 1, 'gauss_points') .and. config%model%gauss_points < 5) then
-         call judge%blame('model', 1, 'bending_shapes', &
+         call checker%report('model', 1, 'bending_shapes', "3 is possible with bending = 'dynamic' only")
+      else if (checker%is_sound('model', 1, 'gauss_points') .and. config%model%gauss_points < 5) then
+         call checker%report('model', 1, 'bending_shapes', &
                     '3 needs gauss_points = 5 or more (the square of the third shape has degree 8)')
       end if
    end subroutine check_model
 
    !> Only dynamic bending has slopes of its own; only rigid rods need no stiffness.
-   subroutine check_bending(judge, config)
-      class(key_judge), intent(inout) :: judge
+   subroutine check_bending(checker, config)
+      class(key_checker), intent(inout) :: checker
       type(case_config), intent(in) :: config
       character(len=:), allocatable :: reason
 
-      if (.not. judge%is_sound('model', 1, 'bending')) return
-      if (config%model%bending /= 'rigid') call judge%require('chain', 1, 'bending_stiffness', &
+      if (.not. checker%is_sound('model', 1, 'bending')) return
+      if (config%model%bending /= 'rigid') call checker%require('chain', 1, 'bending_stiffness', &
          "unless bending = 'rigid'")
       if (config%model%bending /= 'dynamic') then
          reason = "bending = '"//trim(config%model%bending)//"'"
@@ -116,33 +116,33 @@ contains
       subroutine require_zero(key, x)
          character(len=*), intent(in) :: key
          real(wp), intent(in) :: x(:)
-         if (any(abs(x) > 0.0_wp)) call judge%blame('initial', 1, key, 'must be 0 when '//reason)
+         if (any(abs(x) > 0.0_wp)) call checker%report('initial', 1, key, 'must be 0 when '//reason)
       end subroutine require_zero
 
    end subroutine check_bending
 
    !> What moves has mass: the shapes of a rod that bends as motion, and every node or the rod before it.
-   subroutine check_masses(judge, config)
-      class(key_judge), intent(inout) :: judge
+   subroutine check_masses(checker, config)
+      class(key_checker), intent(inout) :: checker
       type(case_config), intent(in) :: config
       real(wp), allocatable :: mass(:)
 
-      if (.not. (judge%is_sound('model', 1, 'bending') .and. judge%is_sound('model', 1, 'inertia'))) return
+      if (.not. (checker%is_sound('model', 1, 'bending') .and. checker%is_sound('model', 1, 'inertia'))) return
       if (config%model%bending == 'dynamic') then
-         if (judge%is_sound('model', 1, 'gauss_points') .and. config%model%gauss_points < 2) &
-            call judge%blame('model', 1, 'gauss_points', "must be at least 2 when bending = 'dynamic'")
+         if (checker%is_sound('model', 1, 'gauss_points') .and. config%model%gauss_points < 2) &
+            call checker%report('model', 1, 'gauss_points', "must be at least 2 when bending = 'dynamic'")
       end if
       if (.not. sound_chain('mass_per_length')) return
       mass = config%chain%mass_per_length
       if (config%model%bending == 'dynamic') then
-         if (any(mass <= 0.0_wp)) call judge%blame('chain', 1, 'mass_per_length', &
+         if (any(mass <= 0.0_wp)) call checker%report('chain', 1, 'mass_per_length', &
             "must be positive when bending = 'dynamic', but is 0 for rod "//to_text(findloc(mass <= 0.0_wp, .true., 1)))
          return
       end if
-      if (.not. judge%is_sound('chain', 1, 'node_mass') .or. size(config%chain%node_mass) /= size(mass)) return
+      if (.not. checker%is_sound('chain', 1, 'node_mass') .or. size(config%chain%node_mass) /= size(mass)) return
       if (config%model%inertia == 'lumped') mass(:size(mass) - 1) = mass(:size(mass) - 1) + mass(2:) ! half of each to a node
       mass = mass + config%chain%node_mass
-      if (any(mass <= 0.0_wp)) call judge%blame('chain', 1, 'node_mass', &
+      if (any(mass <= 0.0_wp)) call checker%report('chain', 1, 'node_mass', &
          'rod '//to_text(findloc(mass <= 0.0_wp, .true., 1))//' and its outer node are both without mass')
 
    contains
@@ -152,32 +152,32 @@ contains
          character(len=*), intent(in) :: key
          sound_chain = .false.
          if (config%chain%n_rods < 1) return
-         if (.not. judge%is_sound('chain', 1, key) .or. .not. judge%is_given('chain', 1, key)) return
+         if (.not. checker%is_sound('chain', 1, key) .or. .not. checker%is_given('chain', 1, key)) return
          sound_chain = size(config%chain%mass_per_length) == config%chain%n_rods
       end function sound_chain
 
    end subroutine check_masses
 
    !> A profile reaches from one existing rod to another.
-   subroutine check_profile_rods(judge, i, profile, n_rods)
-      class(key_judge), intent(inout) :: judge
+   subroutine check_profile_rods(checker, i, profile, n_rods)
+      class(key_checker), intent(inout) :: checker
       integer, intent(in) :: i !! which profile
       type(profile_config), intent(in) :: profile
       integer, intent(in) :: n_rods !! 0: not known
 
-      if (.not. (judge%is_sound('rod_profile', i, 'first_rod') .and. judge%is_sound('rod_profile', i, 'last_rod'))) return
+      if (.not. (checker%is_sound('rod_profile', i, 'first_rod') .and. checker%is_sound('rod_profile', i, 'last_rod'))) return
       if (n_rods > 0 .and. max(profile%first_rod, profile%last_rod) > n_rods) then
-         call judge%blame('rod_profile', i, trim(merge('first_rod', 'last_rod ', profile%first_rod > n_rods)), &
+         call checker%report('rod_profile', i, trim(merge('first_rod', 'last_rod ', profile%first_rod > n_rods)), &
             no_such('rod', 1, n_rods))
       else if (n_rods > 0 .and. profile%first_rod > profile%last_rod) then
-         call judge%blame('rod_profile', i, 'last_rod', 'must not be less than first_rod = '//to_text(profile%first_rod))
+         call checker%report('rod_profile', i, 'last_rod', 'must not be less than first_rod = '//to_text(profile%first_rod))
       end if
    end subroutine check_profile_rods
 
    !> A polynomial or a table, and a factor that is nowhere negative: not zero either where rods bend by statics alone, whose
    !> flexibility is 1/EI.
-   subroutine check_profile(judge, i, profile, positive)
-      class(key_judge), intent(inout) :: judge
+   subroutine check_profile(checker, i, profile, positive)
+      class(key_checker), intent(inout) :: checker
       integer, intent(in) :: i !! which profile
       type(profile_config), intent(in) :: profile
       logical, intent(in) :: positive !! zero is no bending stiffness
@@ -187,37 +187,37 @@ contains
       logical :: ok
 
       key = 'polynomial'
-      if (judge%is_given('rod_profile', i, 'positions') .or. judge%is_given('rod_profile', i, 'values')) then
-         if (judge%is_given('rod_profile', i, key)) then
-            call judge%blame('rod_profile', i, key, 'cannot be combined with positions and values')
+      if (checker%is_given('rod_profile', i, 'positions') .or. checker%is_given('rod_profile', i, 'values')) then
+         if (checker%is_given('rod_profile', i, key)) then
+            call checker%report('rod_profile', i, key, 'cannot be combined with positions and values')
             return
          end if
          key = 'values'
-         call judge%require('rod_profile', i, 'positions', 'with values')
-         call judge%require('rod_profile', i, 'values', 'with positions')
+         call checker%require('rod_profile', i, 'positions', 'with values')
+         call checker%require('rod_profile', i, 'values', 'with positions')
          if (size(profile%positions) == 0 .or. size(profile%values) == 0) return
-         call check_positions(judge, i, profile, ok)
+         call check_positions(checker, i, profile, ok)
          if (.not. ok) return
       else
-         call judge%require('rod_profile', i, key, 'unless positions and values are given')
+         call checker%require('rod_profile', i, key, 'unless positions and values are given')
       end if
-      if (.not. judge%is_sound('rod_profile', i, key) .or. .not. judge%is_sound('rod_profile', i, 'positions')) return
+      if (.not. checker%is_sound('rod_profile', i, key) .or. .not. checker%is_sound('rod_profile', i, 'positions')) return
       call new_rod_profile(compiled, profile)
       rounding = 0.0_wp ! of a polynomial that touches zero
       if (key == 'polynomial') rounding = 16.0_wp*epsilon(1.0_wp)*sum(abs(profile%polynomial))
       if (smallest_value(compiled) < -rounding) then
-         call judge%blame('rod_profile', i, key, 'must not be negative anywhere from 0 to 1, but goes down to '// &
+         call checker%report('rod_profile', i, key, 'must not be negative anywhere from 0 to 1, but goes down to '// &
             short_text(smallest_value(compiled)))
       else if (.not. compiled%mean() > 0.0_wp) then
-         call judge%blame('rod_profile', i, key, 'must not be zero everywhere')
+         call checker%report('rod_profile', i, key, 'must not be zero everywhere')
       else if (positive .and. profile%quantity == 'bending_stiffness' .and. .not. smallest_value(compiled) > 0.0_wp) then
-         call judge%blame('rod_profile', i, key, "must be positive from 0 to 1 when bending = 'quasistatic'")
+         call checker%report('rod_profile', i, key, "must be positive from 0 to 1 when bending = 'quasistatic'")
       end if
    end subroutine check_profile
 
    !> As many values as positions, which rise from 0 to 1; two may be equal, three not.
-   subroutine check_positions(judge, i, profile, ok)
-      class(key_judge), intent(inout) :: judge
+   subroutine check_positions(checker, i, profile, ok)
+      class(key_checker), intent(inout) :: checker
       integer, intent(in) :: i
       type(profile_config), intent(in) :: profile
       logical, intent(out) :: ok
@@ -225,12 +225,12 @@ contains
       ok = .false.
       associate (p => profile%positions, n => size(profile%positions))
          if (size(profile%values) /= n) then
-            call judge%blame('rod_profile', i, 'values', 'must have as many values as positions: '//to_text(n)//', not '// &
+            call checker%report('rod_profile', i, 'values', 'must have as many values as positions: '//to_text(n)//', not '// &
                to_text(size(profile%values)))
          else if (n < 2 .or. any(abs(p([1, n]) - [0.0_wp, 1.0_wp]) > 0.0_wp)) then
-            call judge%blame('rod_profile', i, 'positions', 'must begin with 0 and end with 1')
+            call checker%report('rod_profile', i, 'positions', 'must begin with 0 and end with 1')
          else if (any(p(2:) < p(:n - 1)) .or. any(p(3:) <= p(:n - 2)) .or. p(2) <= 0.0_wp .or. p(n - 1) >= 1.0_wp) then
-            call judge%blame('rod_profile', i, 'positions', &
+            call checker%report('rod_profile', i, 'positions', &
                'must increase; two equal ones make a jump, but not three, nor at the ends')
          else
             ok = .true.
@@ -239,45 +239,45 @@ contains
    end subroutine check_positions
 
    !> Each method has its orders; only some take fixed steps.
-   subroutine check_solver(judge, config)
-      class(key_judge), intent(inout) :: judge
+   subroutine check_solver(checker, config)
+      class(key_checker), intent(inout) :: checker
       type(case_config), intent(in) :: config
       type(method_type) :: method !! nameless: 'auto'
       character(len=:), allocatable :: rule
 
-      if (.not. judge%is_sound('solver', 1, 'method')) return
+      if (.not. checker%is_sound('solver', 1, 'method')) return
       method = method_named(config%solver%method)
       rule = order_rule(method, config%solver%order)
       if (len_trim(method%name) == 0 .and. len(rule) > 0) rule = "needs a named method: 'auto' chooses the order itself"
-      if (len(rule) > 0 .and. judge%is_sound('solver', 1, 'order')) call judge%blame('solver', 1, 'order', rule)
+      if (len(rule) > 0 .and. checker%is_sound('solver', 1, 'order')) call checker%report('solver', 1, 'order', rule)
       if (.not. config%solver%fixed_step > 0.0_wp) return
       if (.not. method%fixed_steps) then
-         call judge%blame('solver', 1, 'fixed_step', 'is possible with method = '//list_of_methods(methods%fixed_steps)//' only')
-      else if (.not. (judge%is_sound('case', 1, 't_end') .and. judge%is_sound('solver', 1, 'max_steps'))) then
+         call checker%report('solver', 1, 'fixed_step', 'is possible with method = '//list_of_methods(methods%fixed_steps)//' only')
+      else if (.not. (checker%is_sound('case', 1, 't_end') .and. checker%is_sound('solver', 1, 'max_steps'))) then
          return
       else if (config%t_end/config%solver%max_steps > config%solver%fixed_step) then
-         call judge%blame('solver', 1, 'fixed_step', 'would take more than max_steps = '// &
+         call checker%report('solver', 1, 'fixed_step', 'would take more than max_steps = '// &
                     to_text(config%solver%max_steps)//' steps until t_end = '//short_text(config%t_end)//' [s]')
       end if
    end subroutine check_solver
 
    !> A load on a node needs an existing node and is a force.
-   subroutine check_target(judge, i, load, n_rods)
-      class(key_judge), intent(inout) :: judge
+   subroutine check_target(checker, i, load, n_rods)
+      class(key_checker), intent(inout) :: checker
       integer, intent(in) :: i !! which load
       type(load_config), intent(in) :: load
       integer, intent(in) :: n_rods !! 0: not known
 
-      if (.not. judge%is_sound('load', i, 'target')) return
+      if (.not. checker%is_sound('load', i, 'target')) return
       if (load%target == 'spacecraft') then
-         if (.not. judge%is_given('load', i, 'node')) return
-         call judge%blame('load', i, 'node', "applies only with target = 'node'")
+         if (.not. checker%is_given('load', i, 'node')) return
+         call checker%report('load', i, 'node', "applies only with target = 'node'")
          return
       end if
-      call judge%require('load', i, 'node', "when target = 'node'")
-      if (n_rods > 0 .and. load%node > n_rods) call judge%blame('load', i, 'node', no_such('node', 1, n_rods))
-      if (load%component /= 'M' .or. .not. judge%is_sound('load', i, 'component')) return
-      call judge%blame('load', i, 'component', &
+      call checker%require('load', i, 'node', "when target = 'node'")
+      if (n_rods > 0 .and. load%node > n_rods) call checker%report('load', i, 'node', no_such('node', 1, n_rods))
+      if (load%component /= 'M' .or. .not. checker%is_sound('load', i, 'component')) return
+      call checker%report('load', i, 'component', &
          "must be 'X' or 'Y' when target = 'node'; moments act on the spacecraft only")
    end subroutine check_target
 

@@ -1,4 +1,4 @@
-!> Times at which something begins, ends or bends: loads, driven kinks, releases of hinges. A run stops at each and starts anew.
+!> Times at which something begins, ends or bends: loads, driven kinks, releases of hinges. A run stops at each and restarts.
 !>
 !> Times that differ by rounding only are one: 0.1 + 0.2 and 0.3, or t_start + (t_end - t_start) and t_end. Between them
 !> nothing can happen, nor could any method step.

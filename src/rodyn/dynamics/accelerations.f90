@@ -52,7 +52,7 @@ module rodyn_accelerations
       procedure :: refresh
       procedure :: move_kinks
       procedure :: change_hinges
-      procedure :: strike
+      procedure :: apply_impulse
       procedure :: set_locked
       procedure :: project_locked
       procedure :: hinge_rotations
@@ -166,7 +166,7 @@ contains
 
    !> What hinges that have just been locked do to the rates: `velocity_jump` of all locked hinges, each with the rate of its
    !> kink afterwards.
-   subroutine strike(self, q, p, lost, worked, ok)
+   subroutine apply_impulse(self, q, p, lost, worked, ok)
       class(dynamics_type), intent(inout) :: self
       real(wp), intent(in) :: q(:)
       real(wp), intent(inout) :: p(:)
@@ -178,7 +178,7 @@ contains
       call self%velocity_jump(q, p, self%hinges%locked, self%hinges%kink_rate, after, lost, impulse, ok)
       worked = sum(impulse*self%hinges%kink_rate)
       p = after
-   end subroutine strike
+   end subroutine apply_impulse
 
    !> Put the kinks where they are at time t.
    subroutine move_kinks(self, t)

@@ -25,7 +25,7 @@ module rodyn_equilibrium
    public :: find_equilibrium
 
    integer, parameter :: most_steps = 100
-   integer, parameter :: most_passes = 20          !! of laws of hinges that change
+   integer, parameter :: most_passes = 20          !! of hinge laws that change
    real(wp), parameter :: longest_step = 0.5_wp    !! change of an angle in one step [rad]
    real(wp), parameter :: smallest_share = 1.0e-4_wp !! of a step, before the search is given up
    real(wp), parameter :: close_enough = 1.0e-9_wp !! the step after one so short is at rounding level [rad]
@@ -166,7 +166,7 @@ contains
       ok = .false.
    end subroutine iterate
 
-   !> Where Newton's path ends at a singular stiffness, or laws of hinges lead it in a circle: the motion M q' = h of the chain
+   !> Where Newton's path ends at a singular stiffness, or hinge laws lead it in a circle: the motion M q' = h of the chain
    !> in a viscous medium leads past it, to an equilibrium that is stable there. Implicit steps of Euler's method, linearised with
    !> the laws that hold at their start, whose length follows from how far they go (pseudo-transient continuation, Kelley & Keyes,
    !> SIAM J. Numer. Anal. 35, 1998, 508). Forces must do work in each, by the trapezoidal rule, so that none comes back.

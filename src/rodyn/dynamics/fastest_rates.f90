@@ -5,7 +5,7 @@
 !> It asks for nothing but accelerations, so it serves every scene, with locked and relaxing hinges, too, and takes the springs with
 !> the moments that they have at q. It knows no bound of its error: two motions of nearly the same rate may make it stop early.
 !> What must not miss the fastest is the matter of `rodyn_fast_eigenvalues`, which takes several times as many
-!> right-hand sides, and a tangent with each pair of them.
+!> evaluations, and a tangent with each pair of them.
 module rodyn_fastest_rates
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type

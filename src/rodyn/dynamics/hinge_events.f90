@@ -1,7 +1,7 @@
 !> Events of a running scene: hinges that are released, latch, meet stops, slide or stick.
 !>
 !> What an integrator watches are the margins of `rodyn_hinge_mechanism`, one for each part that a hinge has. When one becomes
-!> negative the run stops there, `respond` changes the laws, and it starts anew. A hinge that becomes a constraint
+!> negative the run stops there, `respond` changes the laws, and it restarts. A hinge that becomes a constraint
 !> changes the rates in no time: momenta stay, energy is lost (`velocity_jump` of `rodyn_accelerations`).
 !>
 !> Between massless rods the joints follow from their laws (`rodyn_three_moments`), and the laws hold for joints: both are sought
@@ -22,10 +22,10 @@ module rodyn_hinge_events
    private
    public :: hinge_event, event_set, new_event_set
 
-   integer, parameter :: quick_passes = 16   !! of `balance`, in which laws change together
-   integer, parameter :: most_passes = 100000 !! in all
-   integer, parameter :: crowd = 32          !! events of one hinge in no time are chatter
-   real(wp), parameter :: no_time = 1.0e-8_wp !! of the simulated time
+   integer, parameter :: quick_passes = 16         !! of `balance`, in which laws change together
+   integer, parameter :: most_passes = 100000      !! in all
+   integer, parameter :: chatter_count = 32        !! events of one hinge in no time are chatter
+   real(wp), parameter :: chatter_span = 1.0e-8_wp !! of the simulated time
 
    !> Something that a hinge did.
    type :: hinge_event
@@ -215,7 +215,7 @@ contains
       end associate
    end subroutine rest_joints
 
-   !> Choose the laws anew at a state to which no motion led; what is locked stays so.
+   !> Choose the laws again at a state to which no motion led; what is locked stays so.
    subroutine adopt(self, dynamics, t, q, p, changed)
       class(event_set), intent(inout) :: self
       type(dynamics_type), intent(inout) :: dynamics
@@ -322,10 +322,10 @@ contains
       logical :: ok
 
       lost_here = 0.0_wp
-      call dynamics%hinges%mechanisms(which)%snap()
+      call dynamics%hinges%mechanisms(which)%lock_at_latch()
       call dynamics%change_hinges()
       if (dynamics%hinges%mechanisms(which)%is_constrained()) then
-         call dynamics%strike(q, p, lost_here, worked, ok)
+         call dynamics%apply_impulse(q, p, lost_here, worked, ok)
          if (.not. ok) call raise(error, 'latching at t = '//time_text(t)//' s: mass matrix not positive definite')
          if (allocated(error)) return
          self%worked = self%worked + worked
@@ -553,11 +553,11 @@ contains
       end if
       found = 0
       do i = self%n_logged, 1, -1
-         if (self%log(i)%time < t - no_time*self%span) return
+         if (self%log(i)%time < t - chatter_span*self%span) return
          if (self%log(i)%hinge /= hinge) cycle
          found = found + 1
-         if (found < crowd) cycle
-         call raise(error, 'chatter at t = '//time_text(t)//' s: hinge '//to_text(hinge)//' had '//to_text(crowd)// &
+         if (found < chatter_count) cycle
+         call raise(error, 'chatter at t = '//time_text(t)//' s: hinge '//to_text(hinge)//' had '//to_text(chatter_count)// &
                     ' within '//time_text(max(t - self%log(i)%time, tiny(t)))//' s, the last one '//trim(kind_names(kind))// &
                     '; softer stops, more damping or a larger friction_velocity may help')
          return

@@ -297,7 +297,7 @@ contains
       end associate
    end subroutine quadratures
 
-   !> Margins of the laws of hinges.
+   !> Margins of the hinge laws.
    subroutine event_functions(self, t, y, values)
       class(motion_type), intent(inout) :: self
       real(wp), intent(in) :: t
@@ -379,7 +379,7 @@ contains
       end associate
    end subroutine book
 
-   !> Change what an event changes: laws of hinges, and rates where one becomes a constraint.
+   !> Change what an event changes: hinge laws, and rates where one becomes a constraint.
    subroutine respond(self, t, crossed, y, error)
       class(motion_type), intent(inout) :: self
       real(wp), intent(in) :: t          !! [s]
@@ -397,7 +397,7 @@ contains
       call forget_hinges(self)
    end subroutine respond
 
-   !> Drop what was derived from the laws of hinges.
+   !> Drop what was derived from the hinge laws.
    subroutine forget_hinges(self)
       type(motion_type), intent(inout) :: self
       type(newton_type) :: fresh

@@ -223,11 +223,11 @@ contains
       most = max(1, size(modes%square))
       modes%weight = self%weight
       do k = 1, modes%n_dampers
-         call dgemv('N', modes%n, m, 1.0_wp, modes%u, most, self%dampers(:, k), 1, 0.0_wp, modes%grip(:, k), 1)
+         call dgemv('N', modes%n, m, 1.0_wp, modes%u, most, self%dampers(:, k), 1, 0.0_wp, modes%influence(:, k), 1)
       end do
       do i = 1, modes%n
-         modes%grip_t(:, i) = modes%grip(i, :)
-         modes%damping(i) = modes%square(i)*dot_product(modes%grip_t(:, i), modes%grip_t(:, i))
+         modes%influence_t(:, i) = modes%influence(i, :)
+         modes%damping(i) = modes%square(i)*dot_product(modes%influence_t(:, i), modes%influence_t(:, i))
          modes%omega_2(i) = modes%square(i) - modes%weight*modes%damping(i)
       end do
       call modes%bound_coupling()

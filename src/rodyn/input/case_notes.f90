@@ -1,5 +1,5 @@
-!> What is allowed in a case but hardly meant: loads that never act, releases that never come, angles in degrees; and methods whose
-!> errors are not what the tolerances seem to say.
+!> What is allowed in a case but hardly intended: loads that never act, releases that never come, angles in degrees; and methods
+!> whose errors are not what the tolerances seem to say.
 module rodyn_case_notes
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: case_config, hinge_config, none_given

@@ -2,20 +2,20 @@
 !>
 !> Three steps, because how long the arrays are may itself stand in the file: `match_document` finds the rows, the
 !> reader looks up the extents, and `check_document` of `rodyn_document_checks` checks types, rules, counts, indices
-!> and what is missing. Rules that tie several keys together are the reader's; it reports them with `blame`.
+!> and what is missing. Rules that tie several keys together are the reader's; it reports them with `report`.
 module rodyn_checked_document
    use rodyn_faults, only: fault_list
-   use rodyn_key_judge, only: key_judge, no_such
+   use rodyn_key_checker, only: key_checker, no_such
    use rodyn_namelist_document, only: namelist_document, index_text, shown_values
    use rodyn_schema, only: schema_extent, schema_group, schema_row, group_index, misspelt_group, misspelt_key, nearest_group, &
       nearest_key, row_index
    use rodyn_text, only: printable, to_text
    implicit none (type, external)
    private
-   public :: checked_document, match_document, blame, require, no_such, entry_of, is_given, is_sound, group_at, instances
+   public :: checked_document, match_document, report, require, no_such, entry_of, is_given, is_sound, group_at, instances
 
    !> The document, the schema, and what came out. Lives no longer than the document.
-   type, extends(key_judge) :: checked_document
+   type, extends(key_checker) :: checked_document
       type(namelist_document), pointer :: document => null()
       type(schema_group), allocatable :: groups(:)
       type(schema_row), allocatable :: rows(:)
@@ -29,7 +29,7 @@ module rodyn_checked_document
    contains
       procedure :: is_given
       procedure :: is_sound
-      procedure :: blame
+      procedure :: report
       procedure :: require
    end type checked_document
 
@@ -53,7 +53,7 @@ contains
       call sort_groups(checked)
       do i = 1, size(checked%known)
          g = checked%known(i)
-         if (group_index(groups, document%groups(g)%name) == 0) call complain_of_group(checked, g)
+         if (group_index(groups, document%groups(g)%name) == 0) call report_group(checked, g)
          if (i <= checked%before(size(groups))) call match_entries(checked, g, groups(count(checked%before < i))%name)
       end do
       call check_single_groups(checked)
@@ -127,7 +127,7 @@ contains
       end do
    end subroutine check_single_groups
 
-   subroutine complain_of_group(checked, g)
+   subroutine report_group(checked, g)
       type(checked_document), intent(inout) :: checked
       integer, intent(in) :: g
       if (len_trim(checked%document%groups(g)%name) == 0) return ! the parser has said so
@@ -139,7 +139,7 @@ contains
          call checked%faults%add(group%line, '&'//printable(trim(group%name), len(group%name)) &
             //': unknown group; the nearest known one is &'//nearest_group(checked%groups, group%name))
       end associate
-   end subroutine complain_of_group
+   end subroutine report_group
 
    subroutine match_entries(checked, g, group)
       type(checked_document), intent(inout) :: checked
@@ -154,7 +154,7 @@ contains
          end do
          do e = first, last
             if (checked%row(e) > 0 .or. document%entries(e)%faulty) cycle
-            call complain_of_key(checked, g, e, trim(group))
+            call report_key(checked, g, e, trim(group))
             r = row_index(checked%rows, trim(group), misspelt_key(checked%rows, trim(group), document%entries(e)%key))
             if (r > 0 .and. .not. any(checked%row(first:last) == r)) checked%row(e) = r
          end do
@@ -162,7 +162,7 @@ contains
    end subroutine match_entries
 
    !> Name the group that has such a key, or else the nearest key of this group.
-   subroutine complain_of_key(checked, g, e, group)
+   subroutine report_key(checked, g, e, group)
       type(checked_document), intent(inout) :: checked
       integer, intent(in) :: g, e
       character(len=*), intent(in) :: group !! what it is, or seems to be
@@ -180,7 +180,7 @@ contains
          call checked%faults%add(checked%document%entries(e)%line, '&'//trim(checked%document%groups(g)%name)//' '//trim(key)// &
             index_text(checked%document%entries(e))//': unknown key; '//hint)
       end associate
-   end subroutine complain_of_key
+   end subroutine report_key
 
    !> Does the key stand in some group that does not take it? Then that is the fault, not that it is missing.
    logical function is_misplaced(checked, key)
@@ -242,7 +242,7 @@ contains
    end function is_sound
 
    !> Note a fault of a key: in its line if it is given, else in that of its group, else in the last line.
-   subroutine blame(self, group, instance, key, rule)
+   subroutine report(self, group, instance, key, rule)
       class(checked_document), intent(inout) :: self
       character(len=*), intent(in) :: group, key, rule
       integer, intent(in) :: instance !! which of the groups of that name
@@ -265,7 +265,7 @@ contains
          end associate
       end if
       call self%faults%add(line, '&'//group//' '//key//shown//': '//rule)
-   end subroutine blame
+   end subroutine report
 
    !> Note a key that is not given but must be.
    subroutine require(self, group, instance, key, when)
@@ -275,7 +275,7 @@ contains
       character(len=*), intent(in) :: when !! as in 'is required '//when; empty: always
       if (is_given(self, group, instance, key)) return
       if (is_misplaced(self, key)) return
-      call blame(self, group, instance, key, trim('is required '//when))
+      call report(self, group, instance, key, trim('is required '//when))
    end subroutine require
 
 end module rodyn_checked_document

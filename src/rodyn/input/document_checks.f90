@@ -66,7 +66,7 @@ contains
             call broken_rule(document, row, document%values(v), rule)
             if (allocated(rule)) then
                checked%ok(e) = .false.
-               call complain(checked, g, e, element_text(checked, e, element), &
+               call report_fault(checked, g, e, element_text(checked, e, element), &
                   shown_value(document, document%values(v)), rule, document%values(v)%line)
             end if
             element = element + document%values(v)%copies
@@ -99,7 +99,7 @@ contains
    end function element_text
 
    !> Note '&group key(index) = value: rule'.
-   subroutine complain(checked, g, e, where, value, rule, line)
+   subroutine report_fault(checked, g, e, where, value, rule, line)
       type(checked_document), intent(inout) :: checked
       integer, intent(in) :: g, e
       character(len=*), intent(in) :: where !! index in parentheses, or nothing
@@ -108,7 +108,7 @@ contains
       integer, intent(in) :: line
       call checked%faults%add(line, '&'//trim(checked%document%groups(g)%name)//' ' &
          //trim(checked%document%entries(e)%key)//where//' = '//value//': '//rule)
-   end subroutine complain
+   end subroutine report_fault
 
    !> Note a fault of an entry as a whole, and drop the entry.
    subroutine reject(checked, g, e, rule)
@@ -118,7 +118,7 @@ contains
 
       checked%ok(e) = .false.
       associate (entry => checked%document%entries(e))
-         call complain(checked, g, e, index_text(entry), shown_values(checked%document, entry), rule, entry%line)
+         call report_fault(checked, g, e, index_text(entry), shown_values(checked%document, entry), rule, entry%line)
       end associate
    end subroutine reject
 

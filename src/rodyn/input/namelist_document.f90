@@ -47,7 +47,7 @@ module rodyn_namelist_document
       logical :: indexed = .false.
       integer :: lower = 0, upper = 0     !! indices, if indexed
       integer :: first = 1, last = 0      !! values
-      logical :: faulty = .false.         !! the parser has already complained of it
+      logical :: faulty = .false.         !! the parser has already reported it
       logical :: forced = .false.         !! overrides what the file says
    end type namelist_entry
 

@@ -187,7 +187,7 @@ contains
             call parse_assignment(document, s)
          end select
       end do
-      call complain_of_open_group(document, g, s)
+      call report_open_group(document, g, s)
    end subroutine parse_group
 
    !> &end, $end or $ in place of the /.
@@ -200,7 +200,7 @@ contains
       s%at = s%at + length
    end subroutine end_by_word
 
-   subroutine complain_of_open_group(document, g, s)
+   subroutine report_open_group(document, g, s)
       type(namelist_document), intent(inout) :: document
       integer, intent(in) :: g !! group
       type(scanner), intent(in) :: s
@@ -210,7 +210,7 @@ contains
       if (s%at <= len(document%text)) where_noticed = 'the next group begins in line '//to_text(s%line)
       call document%faults%add(document%groups(g)%line, '&'//printable(trim(document%groups(g)%name), shown_max) &
          //': missing / at the end of the group ('//where_noticed//')')
-   end subroutine complain_of_open_group
+   end subroutine report_open_group
 
    !> `key = values`; text that is none gets one fault and is skipped.
    subroutine parse_assignment(document, s)
@@ -382,11 +382,11 @@ contains
          case ('/', '&')
             exit
          case (',')
-            if (value_due) call complain(document, s%line, 'a value is missing before the comma')
+            if (value_due) call report_fault(document, s%line, 'a value is missing before the comma')
             value_due = .true.
             s%at = s%at + 1
          case ('=')
-            call complain(document, s%line, 'unexpected second =')
+            call report_fault(document, s%line, 'unexpected second =')
             s%at = s%at + 1
          case ('#', '%') ! a comment, as other languages have it
             call skip_words(document, s, s%at, 'a comment begins with !')
@@ -398,12 +398,12 @@ contains
          end select
       end do
       associate (entry => document%entries(document%n_entries))
-         if (entry%last < entry%first) call complain(document, entry%line, 'has no value')
+         if (entry%last < entry%first) call report_fault(document, entry%line, 'has no value')
       end associate
    end subroutine parse_values
 
    !> Note a fault of the last entry, the first only, and mark the entry.
-   subroutine complain(document, line, rule, value)
+   subroutine report_fault(document, line, rule, value)
       type(namelist_document), intent(inout) :: document
       integer, intent(in) :: line
       character(len=*), intent(in) :: rule
@@ -417,7 +417,7 @@ contains
          if (present(value)) shown = ' = '//printable(value, shown_max)
          call fault_in_group(document, line, trim(entry%key)//index_text(entry)//shown, rule)
       end associate
-   end subroutine complain
+   end subroutine report_fault
 
    !> One value: [repeat count *] word or string.
    subroutine parse_value(document, s)
@@ -435,18 +435,18 @@ contains
          s%at = last + 1
          call classify(document%text(value%first:value%last), value)
          if (slash_within(document, s)) then
-            call complain_of_slash(document, s, value)
+            call report_slash(document, s, value)
             call add_value(document, value)
             return
          end if
       else if (scan(next_character(document, s), '"''') == 1) then
          call parse_string(document, s, value)
       else
-         call complain(document, s%line, 'a value is missing after the repeat count')
+         call report_fault(document, s%line, 'a value is missing after the repeat count')
          return
       end if
       call add_value(document, value)
-      if (index(blanks//',/!=', next_character(document, s)) == 0) call complain(document, s%line, &
+      if (index(blanks//',/!=', next_character(document, s)) == 0) call report_fault(document, s%line, &
          'a comma or a blank is missing between two values', shown_value(document, value))
    end subroutine parse_value
 
@@ -459,7 +459,7 @@ contains
       slash_within = index(blanks//'/!&$', document%text(s%at + 1:s%at + 1)) == 0
    end function slash_within
 
-   subroutine complain_of_slash(document, s, value)
+   subroutine report_slash(document, s, value)
       type(namelist_document), intent(inout) :: document
       type(scanner), intent(inout) :: s
       type(namelist_value), intent(inout) :: value
@@ -472,15 +472,15 @@ contains
       s%at = last + 1
       value%last = last
       if (any(value%kind == numbers) .and. any(divisor%kind == numbers) .and. abs(divisor%x) > 0.0_wp) then
-         call complain(document, value%line, 'fractions are not computed: write '// &
+         call report_fault(document, value%line, 'fractions are not computed: write '// &
                        tidy(formatted(value%x/divisor%x, '(g0.15)')), document%text(value%first:last))
       else if (any(divisor%kind == numbers)) then
-         call complain(document, value%line, 'a / ends the group; fractions are not computed', document%text(value%first:last))
+         call report_fault(document, value%line, 'a / ends the group; fractions are not computed', document%text(value%first:last))
       else
-         call complain(document, value%line, 'a / ends the group; a string with one must be in quotes', &
+         call report_fault(document, value%line, 'a / ends the group; a string with one must be in quotes', &
                        document%text(value%first:last))
       end if
-   end subroutine complain_of_slash
+   end subroutine report_slash
 
    !> The character at the scanner; a blank at the end of the text.
    pure character(len=1) function next_character(document, s)
@@ -507,7 +507,7 @@ contains
       if (ok) then
          value%copies = copies
       else
-         call complain(document, s%line, 'a repeat count must lie in 1..'//to_text(most_copies), &
+         call report_fault(document, s%line, 'a repeat count must lie in 1..'//to_text(most_copies), &
             document%text(s%at:last))
       end if
       s%at = s%at + star
@@ -537,10 +537,10 @@ contains
       value%last = s%at - merge(2, 1, closed)
       if (.not. closed) then
          call resume_in_line(document, s, value)
-         call complain(document, value%line, 'the string does not end on its line: a quote is missing', &
+         call report_fault(document, value%line, 'the string does not end on its line: a quote is missing', &
             document%text(value%first - 1:value%last))
       else if (control) then
-         call complain(document, value%line, 'control character in a string', shown_value(document, value))
+         call report_fault(document, value%line, 'control character in a string', shown_value(document, value))
       end if
    end subroutine parse_string
 

@@ -6,14 +6,14 @@
 !> CVODE's own rootfinding compares the ends of steps alone.
 !>
 !> Tolerances are those of a step, and errors of these methods have the same sign from one period of a vibration to the next: they
-!> add up, to hundreds and thousands of tolerances where one-step methods leave tens. So CVODE is given smaller ones (`stricter`).
+!> add up, to hundreds and thousands of tolerances where one-step methods leave tens. So CVODE is given smaller ones (`tightened`).
 module rodyn_cvode_integrator
    use, intrinsic :: iso_c_binding, only: c_int, c_long, c_double, c_null_ptr, c_associated, c_loc, c_funloc
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type, raise
    use rodyn_methods, only: method_named, method_type
    use rodyn_ode, only: ode_system, n_quadratures
-   use rodyn_integrator, only: solver_options, solver_statistics, stricter
+   use rodyn_integrator, only: solver_options, solver_statistics, tightened
    use rodyn_quadrature_history, only: quadrature_history
    use rodyn_nvector, only: vector_content, content_of
    use rodyn_newton_solver, only: new_newton_matrix, new_newton_solver, linear_system_shim
@@ -94,7 +94,7 @@ contains
       else
          shorter = merge(0.335_wp, 0.52_wp, order > 2)
       end if
-      inner_options = stricter(options, shorter, order + 1)
+      inner_options = tightened(options, shorter, order + 1)
    end function inner_options
 
    subroutine initialize(self, t, error)

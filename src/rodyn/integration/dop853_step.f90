@@ -3,7 +3,7 @@
 module rodyn_dop853_step
    use rodyn_kinds, only: wp
    use rodyn_ode, only: ode_system
-   use rodyn_integrator, only: solver_options, stricter, cannot_evaluate
+   use rodyn_integrator, only: solver_options, tightened, cannot_evaluate
    use rodyn_dop853_tableau, only: c2, c3, c4, c5, c6, c7, c8, c9, c10, c11, c12, a2_1, a3_1, a3_2, a4_1, &
       a4_3, a5_1, a5_3, a5_4, a6_1, a6_4, a6_5, a7_1, a7_4, a7_5, a7_6, a8_1, a8_4, a8_5, a8_6, a8_7, a9_1, &
       a9_4, a9_5, a9_6, a9_7, a9_8, a10_1, a10_4, a10_5, a10_6, a10_7, a10_8, a10_9, a11_1, a11_4, a11_5, &
@@ -24,7 +24,7 @@ contains
    pure type(solver_options) function inner_options(options)
       type(solver_options), intent(in) :: options !! the user's
       real(wp), parameter :: shorter = 0.86_wp
-      inner_options = stricter(options, shorter, 8)
+      inner_options = tightened(options, shorter, 8)
    end function inner_options
 
    !> k_2..k_12 from k_1 = f.

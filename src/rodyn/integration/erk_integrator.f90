@@ -14,7 +14,7 @@ module rodyn_erk_integrator
    use rodyn_errors, only: error_type, raise
    use rodyn_text, only: time_text
    use rodyn_ode, only: ode_system, n_quadratures
-   use rodyn_integrator, only: solver_options, solver_statistics, stricter
+   use rodyn_integrator, only: solver_options, solver_statistics, tightened
    use rodyn_quadrature_refinement, only: quadrature_refinement
    use rodyn_step_grid, only: step_grid
    use rodyn_erk_tableau, only: load_table, copy_with_errors, first_same_as_last, default_order
@@ -70,7 +70,7 @@ contains
 
       self%order = options%order
       if (self%order == 0) self%order = default_order
-      call self%create(system, options, stricter(options, shorter, merge(8, self%order, self%order >= 7)), system%n_states, &
+      call self%create(system, options, tightened(options, shorter, merge(8, self%order, self%order >= 7)), system%n_states, &
                        'ERKStepEvolve', error)
    end subroutine new_erk_integrator
 
@@ -78,7 +78,7 @@ contains
       class(erk_integrator), intent(inout) :: self
       real(wp), intent(in) :: t !! [s]
       type(error_type), allocatable, intent(inout) :: error
-      integer(c_int), parameter :: interpolant_degree = 3_c_int !! no right-hand sides of its own
+      integer(c_int), parameter :: interpolant_degree = 3_c_int !! no evaluations of its own
 
       self%memory = FERKStepCreate(c_funloc(rhs_shim), t, self%state, self%context)
       if (.not. c_associated(self%memory)) then
@@ -99,7 +99,7 @@ contains
       end associate
    end subroutine initialize
 
-   !> The first step is chosen anew.
+   !> The first step is chosen again.
    subroutine reinitialize(self, t, error)
       class(erk_integrator), intent(inout) :: self
       real(wp), intent(in) :: t !! [s]

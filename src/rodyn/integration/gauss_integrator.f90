@@ -7,7 +7,7 @@
 !> springs and dampers, the residual R = f - F is answered by
 !>     dF = R - u G v.R,   G = 1 - (1 + h D A + h^2 K A^2)^-1   (`rodyn_modal_reply`),
 !> and the first guess extrapolates only N = f + u (K v.Q + D v.P), which is smooth. Three or four iterations
-!> are enough for steps of half a period. The modes are those of a configuration some steps ago; they are found anew
+!> are enough for steps of half a period. The modes are those of a configuration some steps ago; they are found again
 !> when the iterations they cost exceed what finding them does.
 !>
 !> The method is symmetric and symplectic, so that fixed steps keep the energy of an undamped scene for any length of

@@ -175,9 +175,9 @@ contains
 
    contains
 
-      !> Whether this correction was the last one; not `ok`: the iteration diverges. The first contraction is that of what was most wrong
-      !> with the guess, mostly in stiff modes, which contract fast; the rest, hidden below, may contract a hundred times slower,
-      !> as later corrections show, if not of this step, of those before.
+      !> Whether this correction was the last one; not `ok`: the iteration diverges. The first contraction is that of what was
+      !> most wrong with the guess, mostly in stiff modes, which contract fast; the rest, hidden below, may contract a hundred
+      !> times slower, as later corrections show, if not of this step, of those before.
       subroutine judge(done)
          logical, intent(out) :: done
          done = .true.

@@ -21,7 +21,7 @@ module rodyn_integrator
    implicit none (type, external)
    private
    public :: integrator_type, solver_options, solver_statistics, monitor_type
-   public :: stricter, cannot_evaluate
+   public :: tightened, cannot_evaluate
 
    !> Why a step of a mechanical system cannot be made.
    character(len=*), parameter :: cannot_evaluate = &
@@ -30,7 +30,7 @@ module rodyn_integrator
    !> Counts over the whole run, restarts included.
    type :: solver_statistics
       integer(i8) :: n_steps = 0               !! internal steps
-      integer(i8) :: n_rhs = 0                 !! right-hand sides
+      integer(i8) :: n_rhs = 0                 !! right-hand-side evaluations
       integer(i8) :: n_coupled = 0             !! of them, those of collocation while dampers couple its modes
       integer(i8) :: n_jac = 0                 !! Jacobians
       integer(i8) :: n_error_test_failures = 0 !! steps repeated because the error was too large
@@ -74,7 +74,7 @@ module rodyn_integrator
       procedure :: begin_interval
       procedure :: check_target
       procedure :: permit_step
-      procedure :: heed_monitor
+      procedure :: check_monitor
       procedure :: count_as_steps
       procedure :: state_within
    end type integrator_type
@@ -133,7 +133,7 @@ contains
    !> Options with tolerances that make the steps shorter by a factor. A tolerance bounds the error of one step; those of all steps
    !> add up, from one period of a vibration to the next. Each method says with which steps the error at the end stays below
    !> 100 rtol in ordinary scenes (docs/stability.md). Not below what rounding allows.
-   pure function stricter(options, factor, power) result(inner)
+   pure function tightened(options, factor, power) result(inner)
       type(solver_options), intent(in) :: options !! the user's
       real(wp), intent(in) :: factor              !! of the steps, < 1
       integer, intent(in) :: power                !! of the step in the error that is tested
@@ -145,7 +145,7 @@ contains
       inner = options
       inner%rtol = share*options%rtol
       inner%atol = share*options%atol
-   end function stricter
+   end function tightened
 
    !> Never, unless a monitor says otherwise. When true, `advance` ends with exit code `exit_stopped`.
    function stop_requested(self) result(requested)
@@ -233,13 +233,13 @@ contains
          call raise(error, refusal)
          return
       end if
-      call self%heed_monitor(self%t_good, error)
+      call self%check_monitor(self%t_good, error)
       if (.not. allocated(error)) self%n_steps = self%n_steps + 1
    end subroutine permit_step
 
    !> Let the monitor speak and stop the run. Called before each internal step and after each output, of which there may be
    !> any number in a step.
-   subroutine heed_monitor(self, t, error)
+   subroutine check_monitor(self, t, error)
       class(integrator_type), intent(inout) :: self
       real(wp), intent(in) :: t                           !! of the last good state [s]
       type(error_type), allocatable, intent(out) :: error !! a stop was requested
@@ -249,7 +249,7 @@ contains
       if (self%steps_to_look > 0) return
       call look_at_clock(self, t)
       if (self%monitor%stop_requested()) call raise(error, 'stopped on request at t = '//time_text(t)//' s', exit_stopped)
-   end subroutine heed_monitor
+   end subroutine check_monitor
 
    !> Within a step, or an output, there was other work, about that of so many steps: the monitor is asked so much earlier.
    subroutine count_as_steps(self, n)

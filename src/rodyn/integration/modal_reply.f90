@@ -2,7 +2,7 @@
 !>
 !> Modes that are not coupled answer each for itself, by a matrix over the nodes. Where dampers couple them, the equations are
 !> solved for each eigenvalue lambda of A, the four pairs side by side in lanes. With K = square (1 - w G G^T) and
-!> D = square G G^T (`rodyn_stiff_modes`, G the grips) that is
+!> D = square G G^T (`rodyn_stiff_modes`, G the influences) that is
 !>     Z = d + a square G G^T,   d = 1 + h^2 lambda^2 square,   a = h lambda - w h^2 lambda^2,
 !> whose inverse needs that of a matrix over the dampers only (Sherman, Morrison & Woodbury):
 !>     Z^-1 = d^-1 - d^-1 a square G S^-1 G^T d^-1,   S = 1 + G^T d^-1 a square G.
@@ -28,7 +28,7 @@ module rodyn_modal_reply
       real(wp), allocatable :: factor(:, :)      !! a square d^-1 (s, most)
       real(wp), allocatable :: schur(:, :, :)    !! S^-1, (k, l) in its (l, k) (s, n_dampers, n_dampers)
       real(wp), allocatable :: parts(:, :), answers(:, :) !! workspace (s, most)
-      real(wp), allocatable :: grips(:, :), forces(:, :)  !! workspace (s, n_dampers)
+      real(wp), allocatable :: damper_rates(:, :), forces(:, :)  !! workspace (s, n_dampers)
    contains
       procedure :: prepare
       procedure :: answer
@@ -63,11 +63,11 @@ contains
       integer, intent(in) :: most, n_dampers
 
       if (allocated(self%matrices)) then
-         if (size(self%matrices, 3) == most .and. size(self%grips, 2) == n_dampers) return
-         deallocate (self%matrices, self%inverse, self%factor, self%schur, self%parts, self%answers, self%grips, self%forces)
+         if (size(self%matrices, 3) == most .and. size(self%damper_rates, 2) == n_dampers) return
+         deallocate (self%matrices, self%inverse, self%factor, self%schur, self%parts, self%answers, self%damper_rates, self%forces)
       end if
       allocate (self%matrices(s, s, most), self%inverse(s, most), self%factor(s, most), self%schur(s, n_dampers, n_dampers), &
-                self%parts(s, most), self%answers(s, most), self%grips(s, n_dampers), self%forces(s, n_dampers))
+                self%parts(s, most), self%answers(s, most), self%damper_rates(s, n_dampers), self%forces(s, n_dampers))
    end subroutine reserve
 
    !> d^-1, a square d^-1 and S^-1 at the four eigenvalues.
@@ -90,7 +90,7 @@ contains
          do l = 1, k
             self%schur(:, l, k) = 0.0_wp
             do i = 1, modes%n
-               self%schur(:, l, k) = self%schur(:, l, k) + (modes%grip(i, k)*modes%grip(i, l))*self%factor(:, i)
+               self%schur(:, l, k) = self%schur(:, l, k) + (modes%influence(i, k)*modes%influence(i, l))*self%factor(:, i)
             end do
             self%schur(:, k, l) = self%schur(:, l, k)
          end do
@@ -151,11 +151,11 @@ contains
       associate (n => self%n, r => modes%n_dampers)
          call multiply(n, rule%to_pairs, residuals, self%parts)
          call scale(n, self%inverse, self%parts)
-         self%grips = 0.0_wp
-         call expand(r, n, size(modes%grip, 1), modes%grip, self%parts, self%grips)
-         call solve(r, self%schur, self%grips, self%forces)
+         self%damper_rates = 0.0_wp
+         call expand(r, n, size(modes%influence, 1), modes%influence, self%parts, self%damper_rates)
+         call solve(r, self%schur, self%damper_rates, self%forces)
          self%answers(:, :n) = 0.0_wp
-         call expand(n, r, r, modes%grip_t, self%forces, self%answers)
+         call expand(n, r, r, modes%influence_t, self%forces, self%answers)
          call scale(n, self%factor, self%answers)
          self%parts(:, :n) = self%parts(:, :n) - self%answers(:, :n)
          reply(:, :n) = -residuals(:, :n)

@@ -154,7 +154,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       call self%check_target(t_out, error)
-      if (.not. allocated(error)) call heed_stop(self, error)
+      if (.not. allocated(error)) call check_stop(self, error)
       do while (.not. allocated(error) .and. self%t_good < t_out .and. .not. self%pending)
          call self%permit_step(error)
          if (.not. allocated(error)) call one_step(self, error)
@@ -170,14 +170,14 @@ contains
    end subroutine advance
 
    !> Tell the library a new stop time, if it is one.
-   subroutine heed_stop(self, error)
+   subroutine check_stop(self, error)
       class(sundials_integrator), intent(inout) :: self
       type(error_type), allocatable, intent(inout) :: error
       if (.not. (self%stop_in_force < self%t_stop .or. self%stop_in_force > self%t_stop)) return
       if (.not. self%t_stop > self%t_good) return
       call self%tell_stop(error)
       if (.not. allocated(error)) self%stop_in_force = self%t_stop
-   end subroutine heed_stop
+   end subroutine check_stop
 
    !> One internal step of the library.
    subroutine one_step(self, error)

@@ -11,8 +11,8 @@ module rodyn_stiff_modes
 
    !> The stiff part of M(q) p' = ... - K q - D p near a configuration, in modes that are orthogonal for K + w D:
    !>     M^-1 (K + w D) ~ sum square_i u_i v_i^T,   v_i^T u_j = delta_ij,
-   !>     M^-1 D ~ sum square_i (grip_i . grip_j) u_i v_j^T.
-   !> `grip_i` is how mode i moves the dampers, D = G G^T, grip_i = G^T u_i. If dampers are weak, or much stronger than the
+   !>     M^-1 D ~ sum square_i (influence_i . influence_j) u_i v_j^T.
+   !> `influence_i`: how mode i moves the dampers, D = G G^T, influence_i = G^T u_i. If dampers are weak or much stronger than the
    !> springs, the modes are nearly orthogonal for both. Else they are `coupled`: the products of different modes matter, too. How
    !> much dampers matter beside springs depends on the length of a step, and so does that.
    type :: stiff_modes
@@ -21,14 +21,14 @@ module rodyn_stiff_modes
       logical :: coupled = .false.           !! in the steps in hand, see `coupling`
       logical :: may_couple = .false.        !! in steps of some length
       real(wp) :: weight = 0.0_wp            !! w [1/s]
-      real(wp), allocatable :: square(:)     !! (most) [1/s^2]
-      real(wp), allocatable :: omega_2(:)    !! square_i - w damping_i: by springs alone (most) [rad^2/s^2]
-      real(wp), allocatable :: damping(:)    !! square_i grip_i . grip_i (most) [1/s]
-      real(wp), allocatable :: u(:, :)       !! shapes, transposed (most, n_dof)
-      real(wp), allocatable :: v(:, :)       !! their duals, without ignorable coordinates (n_dof - n_ignorable, most)
-      real(wp), allocatable :: grip(:, :)    !! (most, n_dampers) [s^1/2]
-      real(wp), allocatable :: grip_t(:, :)  !! the same, transposed
-      real(wp), allocatable, private :: work(:), grips(:), lane_grips(:, :) !! (most), (n_dampers), (lanes, n_dampers)
+      real(wp), allocatable :: square(:)          !! (most) [1/s^2]
+      real(wp), allocatable :: omega_2(:)         !! square_i - w damping_i: by springs alone (most) [rad^2/s^2]
+      real(wp), allocatable :: damping(:)         !! square_i influence_i . influence_i (most) [1/s]
+      real(wp), allocatable :: u(:, :)            !! shapes, transposed (most, n_dof)
+      real(wp), allocatable :: v(:, :)            !! their duals, without ignorable coordinates (n_dof - n_ignorable, most)
+      real(wp), allocatable :: influence(:, :)    !! (most, n_dampers) [s^1/2]
+      real(wp), allocatable :: influence_t(:, :)  !! the same, transposed
+      real(wp), allocatable, private :: work(:), damper_rates(:), lane_damper_rates(:, :) !! (most), (n_dampers), (lanes, n_dampers)
    contains
       procedure :: reserve
       procedure :: fastest
@@ -48,13 +48,13 @@ contains
 
       if (allocated(self%square)) then
          if (size(self%square) == most .and. self%n_dampers == n_dampers) return
-         deallocate (self%square, self%omega_2, self%damping, self%u, self%v, self%grip, self%grip_t, self%work, self%grips, &
-                     self%lane_grips)
+         deallocate (self%square, self%omega_2, self%damping, self%u, self%v, self%influence, self%influence_t, self%work, &
+                     self%damper_rates, self%lane_damper_rates)
       end if
       self%n_dampers = n_dampers
       allocate (self%square(most), self%omega_2(most), self%damping(most), self%u(most, n_dof), self%v(n_dof - n_ignorable, most), &
-                self%grip(most, n_dampers), self%grip_t(n_dampers, most), self%work(most), self%grips(n_dampers), &
-                self%lane_grips(s, n_dampers))
+                self%influence(most, n_dampers), self%influence_t(n_dampers, most), self%work(most), self%damper_rates(n_dampers), &
+                self%lane_damper_rates(s, n_dampers))
    end subroutine reserve
 
    !> The fastest rate, dampers included as far as their weight does [rad/s].
@@ -86,9 +86,9 @@ contains
             work(l, i) = work(l, i) - self%weight*rates(l, i)
          end do
       end do
-      self%lane_grips = 0.0_wp
-      call expand(self%n_dampers, self%n, size(self%grip, 1), self%grip, work, self%lane_grips)
-      call expand(self%n, self%n_dampers, self%n_dampers, self%grip_t, self%lane_grips, rates)
+      self%lane_damper_rates = 0.0_wp
+      call expand(self%n_dampers, self%n, size(self%influence, 1), self%influence, work, self%lane_damper_rates)
+      call expand(self%n, self%n_dampers, self%n_dampers, self%influence_t, self%lane_damper_rates, rates)
       do i = 1, self%n
          rates(:, i) = self%square(i)*rates(:, i)
       end do
@@ -111,14 +111,14 @@ contains
             return
          end if
          self%work(:n) = slope(:n) - w*offset(:n)
-         call grip_all(self)
+         call sum_damper_rates(self)
          do i = 1, n
-            offset(i) = self%square(i)*(offset(i) + dot_product(self%grip_t(:, i), self%grips))
+            offset(i) = self%square(i)*(offset(i) + dot_product(self%influence_t(:, i), self%damper_rates))
          end do
          self%work(:n) = slope(:n)
-         call grip_all(self)
+         call sum_damper_rates(self)
          do i = 1, n
-            slope(i) = self%square(i)*(slope(i) - w*dot_product(self%grip_t(:, i), self%grips))
+            slope(i) = self%square(i)*(slope(i) - w*dot_product(self%influence_t(:, i), self%damper_rates))
          end do
       end associate
    end subroutine stiff_line
@@ -166,17 +166,17 @@ contains
    pure real(wp) function contact(self, i, j)
       type(stiff_modes), intent(in) :: self
       integer, intent(in) :: i, j
-      contact = dot_product(self%grip_t(:, i), self%grip_t(:, j))**2
+      contact = dot_product(self%influence_t(:, i), self%influence_t(:, j))**2
    end function contact
 
    !> What all modes together, each by its `work`, do to the dampers.
-   subroutine grip_all(self)
+   subroutine sum_damper_rates(self)
       class(stiff_modes), intent(inout) :: self
       integer :: k
       do k = 1, self%n_dampers
-         self%grips(k) = dot_product(self%grip(:self%n, k), self%work(:self%n))
+         self%damper_rates(k) = dot_product(self%influence(:self%n, k), self%work(:self%n))
       end do
-   end subroutine grip_all
+   end subroutine sum_damper_rates
 
    !> What a step of collocation loses of positions, in tolerances. A mode that gives way fast follows its force, q ~ v.N/omega^2,
    !> and of that P_s, which vanishes at all nodes, is lost: order s instead of 2 s. The answer of q' = -r q + r P_s at the end of a

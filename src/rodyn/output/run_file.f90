@@ -56,7 +56,7 @@ module rodyn_run_file
       type(solver_options) :: options             !! of the case
       real(wp) :: last_step = 0.0_wp              !! [s]
       integer(i8) :: n_steps = 0_i8
-      integer(i8) :: n_rhs = 0_i8                 !! right-hand sides
+      integer(i8) :: n_rhs = 0_i8                 !! right-hand-side evaluations
       integer(i8) :: n_jac = 0_i8                 !! Jacobians
       integer(i8) :: n_nonlinear_failures = 0_i8
       integer(i8) :: n_error_test_failures = 0_i8

@@ -63,7 +63,7 @@ contains
             if (options%help) then
                if (launch%rank == 0) call print_text(help_text(command), error)
             else if (launch%count > 1 .and. (command == 'run' .or. command == 'modes')) then
-               call refuse_company(command, launch, error)
+               call refuse_several_processes(command, launch, error)
             else if (command == 'run') then
                call run_file_command(options, error)
             else if (command == 'sweep') then
@@ -93,7 +93,7 @@ contains
    end subroutine run_command
 
    !> Several processes would all compute the same.
-   subroutine refuse_company(command, launch, error)
+   subroutine refuse_several_processes(command, launch, error)
       character(len=*), intent(in) :: command
       type(launch_type), intent(in) :: launch
       type(error_type), allocatable, intent(out) :: error
@@ -101,7 +101,7 @@ contains
                  ' = '//to_text(launch%count)//'), and one computes a case; start it without mpirun or srun, '// &
                  'or with one process. rodyn sweep shares many cases among processes; to give each process a case of its own, '// &
                  'unset '//launch%variable, exit_bad_input)
-   end subroutine refuse_company
+   end subroutine refuse_several_processes
 
    !> Print what a command was asked for. That it could not be written is a failure.
    subroutine print_text(text, error)

@@ -72,7 +72,7 @@ module rodyn_hinge_mechanism
       procedure :: change
       procedure :: lock
       procedure :: face_latch
-      procedure :: snap
+      procedure :: lock_at_latch
       procedure :: release
       procedure :: list_events
       procedure :: linear_law
@@ -311,11 +311,11 @@ contains
    end subroutine face_latch
 
    !> Lock at the latch, for good.
-   pure subroutine snap(self)
+   pure subroutine lock_at_latch(self)
       class(hinge_mechanism), intent(inout) :: self
       call self%lock(self%latch)
       self%latched = .true.
-   end subroutine snap
+   end subroutine lock_at_latch
 
    !> Release what was held; what the lock's spring holds is lost.
    pure subroutine release(self, theta, lost)

@@ -1,12 +1,12 @@
 !> The integrator of a run: the method that the case names, or with `method = 'auto'` the one that fits, and another where the
-!> motion changes its character or a method gives up.
+!> motion changes its character or a method fails.
 !>
 !> A choice (`rodyn_method_choice`) holds for the laws that hinges have when it is made. At a time that is known before, as that of
 !> a release, it is made for laws that are new; for others the last one is taken again. After an event the run goes on by
-!> explicit steps: where the next event comes soon, nothing is gained by a choice, so it is made after `probation` right-hand
-!> sides. Where BDF is slower than explicit steps would be, the choice is made anew, too. All later trials together may cost a
+!> explicit steps: where the next event comes soon, nothing is gained by a choice, so it is made after `choice_delay` right-hand
+!> sides. Where BDF is slower than explicit steps would be, the choice is made again, too. All later trials together may cost a
 !> share of what the run has cost; one that this ends before it knows enough is made again when the run has cost twice as much.
-!> A method that gives up is left for good, and another one goes on from the last good state.
+!> A method that fails is not used again, and another one goes on from the last good state.
 module rodyn_driver
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp, i8
@@ -17,8 +17,8 @@ module rodyn_driver
    use rodyn_integrators, only: new_integrator
    use rodyn_method_choice, only: method_choice, choose_method, named_method
    use rodyn_method_costs, only: candidates, collocation, effort_of, explicit, n_even
-   use rodyn_method_numbers, only: clear_advantage, effort_of_rates, explicit_step, most_verdicts, postponed, probation, &
-      short_probation, trial_share, trials_free, watch_steps
+   use rodyn_method_numbers, only: clear_advantage, effort_of_rates, explicit_step, most_past_choices, postponed, choice_delay, &
+      short_delay, trial_share, trials_free, watch_steps
    use rodyn_motion, only: motion_type
    use rodyn_step_limit, only: check_fixed_step
    implicit none (type, external)
@@ -33,14 +33,14 @@ module rodyn_driver
       logical :: gave_up = .false.
    end type member_type
 
-   !> What was chosen for some laws of hinges.
-   type :: verdict_type
+   !> What was chosen for some hinge laws.
+   type :: past_choice
       integer, allocatable :: laws(:) !! numbers of the laws of mechanisms
       integer :: member = 0
       character(len=:), allocatable :: reason
       real(wp) :: pace = 0.0_wp       !! of the best even method [s]
       logical :: clear = .false.      !! an implicit method that left explicit steps far behind
-   end type verdict_type
+   end type past_choice
 
    !> All methods together, to those who run them an integrator like others.
    type, extends(integrator_type) :: driver_type
@@ -54,15 +54,15 @@ module rodyn_driver
       type(motion_type), pointer, private :: motion => null() !! not owned
       real(wp), private :: t_end = 0.0_wp            !! of the run [s]
       integer, private :: n_outputs = 0
-      integer, private :: now = 1                    !! member at work
+      integer, private :: now = 1                    !! active member
       logical, private :: begun = .false.
       logical, private :: timed = .false.            !! the next start is at a time that was known before
-      type(verdict_type), allocatable, private :: verdicts(:) !! the last one first
-      logical, private :: on_probation = .false.
+      type(past_choice), allocatable, private :: past_choices(:) !! the last one first
+      logical, private :: is_delayed = .false.
       real(wp), private :: pace = 0.0_wp             !! expected of explicit steps or collocation [s]; 0: nothing is watched
-      real(wp), private :: t_window = 0.0_wp         !! since when probation or watch lasts [s]
-      real(wp), private :: effort_window = 0.0_wp    !! of the member at work at that time
-      real(wp), private :: effort_begun = 0.0_wp     !! likewise, when it was put to work
+      real(wp), private :: t_window = 0.0_wp         !! since when the delay or the watch lasts [s]
+      real(wp), private :: effort_window = 0.0_wp    !! of the active member at that time
+      real(wp), private :: effort_begun = 0.0_wp     !! likewise, when it was started
       real(wp), private :: spent = 0.0_wp            !! effort of the run until then
       real(wp) :: tried = 0.0_wp                     !! effort of later choices
       real(wp), private :: next_choice = 0.0_wp      !! effort of the run before which none is made
@@ -79,7 +79,7 @@ module rodyn_driver
       procedure :: finalize
       procedure :: set_stop
       procedure :: set_monitor
-      procedure :: heed_monitor
+      procedure :: check_monitor
       procedure :: methods
       procedure :: reason
       procedure, private :: name
@@ -105,7 +105,7 @@ contains
       driver%history = ''
       driver%failures = ''
       driver%used = ''
-      allocate (driver%verdicts(0))
+      allocate (driver%past_choices(0))
       if (present(monitor)) call driver%set_monitor(monitor)
       if (solver%method == 'auto') then
          call choose_first(driver, y, error)
@@ -138,7 +138,7 @@ contains
       real(wp), intent(in) :: y(:)            !! (n_states)
       type(method_choice), intent(out) :: choice
       integer, intent(out) :: member
-      type(verdict_type) :: verdict
+      type(past_choice) :: past
       real(wp) :: t_until
       logical :: out(size(candidates))
       integer :: i
@@ -149,21 +149,21 @@ contains
                          nint(self%n_outputs*((t_until - t)/self%t_end)), out, most_trial(self), self%monitor)
       if (self%n_choices > 0) self%tried = self%tried + choice%effort + effort_of_rates
       self%n_choices = self%n_choices + 1
-      self%on_probation = .not. choice%conclusive
-      if (self%on_probation) self%next_choice = postponed*effort_of_run(self)
+      self%is_delayed = .not. choice%conclusive
+      if (self%is_delayed) self%next_choice = postponed*effort_of_run(self)
       member = findloc(self%members%gave_up, .false., dim=1)
       if (.not. self%members(choice%candidate)%gave_up) member = choice%candidate
       self%pace = 0.0_wp
-      if (self%on_probation) return
-      verdict = verdict_type(motion%dynamics%hinges%mechanisms%law_number(), member, choice%reason(), &
+      if (self%is_delayed) return
+      past = past_choice(motion%dynamics%hinges%mechanisms%law_number(), member, choice%reason(), &
                              merge(choice%pace, 0.0_wp, choice%tried .and. member > n_even), &
                              member > n_even .and. choice%advantage > clear_advantage)
-      self%pace = verdict%pace
-      i = place_of(self, verdict%laws)
+      self%pace = past%pace
+      i = place_of(self, past%laws)
       if (i > 0) then
-         self%verdicts(i) = verdict
+         self%past_choices(i) = past
       else
-         self%verdicts = [verdict, self%verdicts(:min(size(self%verdicts), most_verdicts - 1))]
+         self%past_choices = [past, self%past_choices(:min(size(self%past_choices), most_past_choices - 1))]
       end if
    end subroutine judge
 
@@ -175,24 +175,24 @@ contains
          most_trial = max(trials_free, trials_free + trial_share*effort_of_run(self) - self%tried)
    end function most_trial
 
-   !> Where the verdict on some laws stands; 0: there is none.
+   !> Where the earlier choice for some laws stands; 0: there is none.
    pure integer function place_of(self, laws)
       type(driver_type), intent(in) :: self
       integer, intent(in) :: laws(:)
       integer :: i
       place_of = 0
-      do i = 1, size(self%verdicts)
-         if (all(self%verdicts(i)%laws == laws)) place_of = i
+      do i = 1, size(self%past_choices)
+         if (all(self%past_choices(i)%laws == laws)) place_of = i
       end do
    end function place_of
 
-   !> Where the verdict on today's laws stands; 0: there is none, or its method has given up.
-   pure integer function known_verdict(self)
+   !> Where the earlier choice for today's laws stands; 0: there is none, or its method has given up.
+   pure integer function known_choice(self)
       type(driver_type), intent(in) :: self
-      known_verdict = place_of(self, self%motion%dynamics%hinges%mechanisms%law_number())
-      if (known_verdict == 0) return
-      if (self%members(self%verdicts(known_verdict)%member)%gave_up) known_verdict = 0
-   end function known_verdict
+      known_choice = place_of(self, self%motion%dynamics%hinges%mechanisms%law_number())
+      if (known_choice == 0) return
+      if (self%members(self%past_choices(known_choice)%member)%gave_up) known_choice = 0
+   end function known_choice
 
    !> First start, or exact restart; before it, the method that fits what begins here.
    subroutine start(self, t, y, error)
@@ -206,7 +206,7 @@ contains
       self%y_last = y
       member = self%now
       if (self%begun .and. self%choice%automatic .and. self%motion%events%watches) call reconsider(self, member)
-      call set_to_work(self, member, error)
+      call start_member(self, member, error)
       self%timed = .false.
    end subroutine start
 
@@ -216,34 +216,34 @@ contains
       integer, intent(out) :: member
       integer :: known
 
-      known = known_verdict(self)
-      self%on_probation = .false.
+      known = known_choice(self)
+      self%is_delayed = .false.
       self%pace = 0.0_wp
       member = self%now
-      if (known > 0) member = self%verdicts(known)%member
+      if (known > 0) member = self%past_choices(known)%member
       if (known > 0 .and. (self%timed .or. member <= n_even)) then
          call follow(self, known, member)
       else if ((self%timed .and. may_choose(self)) .or. self%members(explicit)%gave_up) then
          call judge_here(self, member)
       else
-         self%on_probation = .true.
+         self%is_delayed = .true.
          self%why = 'explicit steps after an event'
          member = explicit
       end if
    end subroutine reconsider
 
-   !> The method of a verdict.
+   !> The method of an earlier choice.
    subroutine follow(self, known, member)
       type(driver_type), intent(inout) :: self
       integer, intent(in) :: known
       integer, intent(out) :: member
-      self%on_probation = .false.
-      self%pace = self%verdicts(known)%pace
-      self%why = self%verdicts(known)%reason
-      member = self%verdicts(known)%member
+      self%is_delayed = .false.
+      self%pace = self%past_choices(known)%pace
+      self%why = self%past_choices(known)%reason
+      member = self%past_choices(known)%member
    end subroutine follow
 
-   !> Choose anew, at the last good state. Where a trial tells nothing, an implicit method that was far ahead the last time is
+   !> Choose again, at the last good state. Where a trial tells nothing, an implicit method that was far ahead the last time is
    !> taken again; its pace is watched.
    subroutine judge_here(self, member)
       type(driver_type), intent(inout) :: self
@@ -260,8 +260,8 @@ contains
    !> Whether an implicit method was far ahead the last time, which is worth a try under other laws, too.
    pure logical function last_is_clear(self)
       type(driver_type), intent(in) :: self
-      last_is_clear = size(self%verdicts) > 0
-      if (last_is_clear) last_is_clear = self%verdicts(1)%clear .and. .not. self%members(self%verdicts(1)%member)%gave_up
+      last_is_clear = size(self%past_choices) > 0
+      if (last_is_clear) last_is_clear = self%past_choices(1)%clear .and. .not. self%members(self%past_choices(1)%member)%gave_up
    end function last_is_clear
 
    !> One more line of the history.
@@ -281,7 +281,7 @@ contains
    end subroutine append_line
 
    !> Start a member at the last good state; where it fails, another.
-   subroutine set_to_work(self, member, error)
+   subroutine start_member(self, member, error)
       type(driver_type), intent(inout) :: self
       integer, value :: member
       type(error_type), allocatable, intent(out) :: error
@@ -289,7 +289,7 @@ contains
       if (self%begun .and. self%name(member) /= self%name(self%now) .and. .not. self%members(self%now)%gave_up) &
          call tell(self, 'from t = '//time_text(self%t_last)//' s '//self%name(member)//': '//self%why)
       do
-         call employ(self, member, error)
+         call switch_to(self, member, error)
          if (.not. allocated(error)) then
             call limit_steps(self)
             call self%members(member)%integrator%set_stop(self%t_stop)
@@ -304,17 +304,17 @@ contains
       if (index(self%used, self%name(member)) > 0) return
       if (len(self%used) > 0) self%used = self%used//', '
       self%used = self%used//self%name(member)
-   end subroutine set_to_work
+   end subroutine start_member
 
    !> Make the integrator of a method that the case names, which may not know how to integrate it: an error before the run.
    subroutine make(self, error)
       class(driver_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
-      if (.not. self%choice%automatic) call employ(self, self%now, error)
+      if (.not. self%choice%automatic) call switch_to(self, self%now, error)
    end subroutine make
 
    !> Put a member in its place, made if it is new. It goes on counting the steps of the run.
-   subroutine employ(self, member, error)
+   subroutine switch_to(self, member, error)
       type(driver_type), intent(inout) :: self
       integer, intent(in) :: member
       type(error_type), allocatable, intent(out) :: error
@@ -335,15 +335,15 @@ contains
       self%effort_begun = effort_of_member(self)
       self%effort_window = self%effort_begun
       self%t_window = self%t_last
-   end subroutine employ
+   end subroutine switch_to
 
-   !> How far the member at work may go until it is looked at.
+   !> How far the active member may go until it is looked at.
    subroutine limit_steps(self)
       type(driver_type), intent(inout) :: self
       integer(i8) :: most
       most = self%options%max_steps
-      if (self%on_probation) then
-         most = min(most, self%n_steps + ceiling(short_probation/explicit_step))
+      if (self%is_delayed) then
+         most = min(most, self%n_steps + ceiling(short_delay/explicit_step))
       else if (self%pace > 0.0_wp) then
          most = min(most, self%n_steps + watch_steps)
       end if
@@ -398,7 +398,7 @@ contains
          call replace(self, error, member)
          if (allocated(error)) return
       end if
-      call set_to_work(self, member, error)
+      call start_member(self, member, error)
    end subroutine go_on
 
    !> Whether what has ended the steps is the method's own.
@@ -417,13 +417,13 @@ contains
       integer :: known
 
       effort = effort_of_member(self) - self%effort_window
-      if (self%on_probation) then
-         known = known_verdict(self)
+      if (self%is_delayed) then
+         known = known_choice(self)
          if (known > 0) then
             call follow(self, known, member)
          else if (last_is_clear(self)) then
             call follow(self, 1, member)
-         else if (effort >= probation .and. may_choose(self)) then
+         else if (effort >= choice_delay .and. may_choose(self)) then
             call judge_here(self, member)
          end if
          return
@@ -448,7 +448,7 @@ contains
       integer :: i
 
       self%members(member)%gave_up = .true.
-      self%on_probation = .false.
+      self%is_delayed = .false.
       if (allocated(self%cause)) then
          if (self%t_last > self%t_cause) deallocate (self%cause)
       end if
@@ -468,7 +468,7 @@ contains
       call tell(self, line)
    end subroutine replace
 
-   !> Whether a candidate may be put to work now.
+   !> Whether a candidate may be started now.
    logical function suits(self, member)
       type(driver_type), intent(in) :: self
       integer, intent(in) :: member
@@ -485,7 +485,7 @@ contains
       if (self%choice%automatic) name = trim(candidates(member)%method)
    end function name
 
-   !> Effort of the member at work, all in all.
+   !> Effort of the active member, all in all.
    real(wp) function effort_of_member(self)
       type(driver_type), intent(inout) :: self
       effort_of_member = 0.0_wp
@@ -534,12 +534,12 @@ contains
       end do
    end subroutine set_monitor
 
-   subroutine heed_monitor(self, t, error)
+   subroutine check_monitor(self, t, error)
       class(driver_type), intent(inout) :: self
       real(wp), intent(in) :: t !! of the last good state [s]
       type(error_type), allocatable, intent(out) :: error !! a stop was requested
-      call self%members(self%now)%integrator%heed_monitor(t, error)
-   end subroutine heed_monitor
+      call self%members(self%now)%integrator%check_monitor(t, error)
+   end subroutine check_monitor
 
    !> Sums over all methods; order and step of the last one.
    function statistics(self) result(stats)

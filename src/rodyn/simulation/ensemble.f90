@@ -69,15 +69,15 @@ module rodyn_ensemble
       end subroutine finish_interface
    end interface
 
-   type :: seat
+   type :: slot
       class(ensemble_member), pointer :: member => null()
-   end type seat
+   end type slot
 
    !> An ensemble at work.
    type :: ensemble_type
       type(lane_motion) :: motion
       type(lane_dop853) :: integrator
-      type(seat) :: seats(lanes)
+      type(slot) :: slots(lanes)
       integer(i8) :: clock = 0            !! up to which time has been shared out [counts]
       integer(i8) :: clock_look = 0       !! at the last look [counts]
       integer :: stride = 1, to_look = 1  !! passes from look to look at the clock
@@ -107,9 +107,9 @@ contains
       call new_lane_dop853(ensemble%integrator, ensemble%motion)
       allocate (ensemble%y(2*ensemble%motion%n_dof))
       call system_clock(ensemble%clock)
-      call seat_member(ensemble, client, 1, first)
+      call occupy(ensemble, client, 1, first)
       do
-         if (.not. ensemble%stopped) call fill_seats(ensemble, client)
+         if (.not. ensemble%stopped) call fill_slots(ensemble, client)
          if (all_empty(ensemble)) exit
          call ensemble%integrator%try()
          call handle_events(ensemble, client)
@@ -122,36 +122,36 @@ contains
       integer :: lane
       all_empty = .true.
       do lane = 1, lanes
-         if (associated(ensemble%seats(lane)%member)) all_empty = .false.
+         if (associated(ensemble%slots(lane)%member)) all_empty = .false.
       end do
    end function all_empty
 
    !> Put cases into the lanes that are free.
-   subroutine fill_seats(ensemble, client)
+   subroutine fill_slots(ensemble, client)
       type(ensemble_type), intent(inout) :: ensemble
       class(ensemble_client), intent(inout) :: client
       class(ensemble_member), pointer :: member
       integer :: lane
 
       do lane = 1, lanes
-         do while (.not. associated(ensemble%seats(lane)%member)) ! a case may fail at once
+         do while (.not. associated(ensemble%slots(lane)%member)) ! a case may fail at once
             call share_time(ensemble)
             call client%take(member)
             call system_clock(ensemble%clock)
             if (.not. associated(member)) return
-            call seat_member(ensemble, client, lane, member)
+            call occupy(ensemble, client, lane, member)
          end do
       end do
-   end subroutine fill_seats
+   end subroutine fill_slots
 
    !> Start a case in a lane.
-   subroutine seat_member(ensemble, client, lane, member)
+   subroutine occupy(ensemble, client, lane, member)
       type(ensemble_type), intent(inout) :: ensemble
       class(ensemble_client), intent(inout) :: client
       integer, intent(in) :: lane
       class(ensemble_member), pointer, intent(inout) :: member
 
-      ensemble%seats(lane)%member => member
+      ensemble%slots(lane)%member => member
       member%ends = interval_ends(member%motion%switches, member%t_end)
       member%t = 0.0_wp
       member%segment = 1
@@ -160,12 +160,12 @@ contains
       call set_regime(ensemble, lane)
       if (wanted(member) <= 0.0_wp) call show(ensemble, client, lane, 0.0_wp, member%y)
       if (allocated(member%error)) then
-         call vacate(ensemble, client, lane)
+         call free_slot(ensemble, client, lane)
          return
       end if
       call ensemble%integrator%enter(lane, member%options, 0.0_wp, member%y, member%ends(1), wanted(member))
       call handle_event(ensemble, client, lane)
-   end subroutine seat_member
+   end subroutine occupy
 
    !> The next output of the present regime; huge: none [s].
    pure real(wp) function wanted(member)
@@ -179,7 +179,7 @@ contains
    subroutine set_regime(ensemble, lane)
       type(ensemble_type), intent(inout) :: ensemble
       integer, intent(in) :: lane
-      associate (member => ensemble%seats(lane)%member)
+      associate (member => ensemble%slots(lane)%member)
          call member%motion%dynamics%set_regime(member%t, member%ends(member%segment))
          call ensemble%motion%set_regime(lane, member%motion%dynamics%regime)
       end associate
@@ -200,7 +200,7 @@ contains
       class(ensemble_client), intent(inout) :: client
       integer, intent(in) :: lane
 
-      associate (integrator => ensemble%integrator, member => ensemble%seats(lane)%member)
+      associate (integrator => ensemble%integrator, member => ensemble%slots(lane)%member)
          do
             select case (integrator%event(lane))
             case (at_output)
@@ -209,7 +209,7 @@ contains
                if (.not. allocated(member%error)) call integrator%proceed(lane, wanted(member))
             case (at_stop)
                if (member%segment == size(member%ends)) then
-                  call vacate(ensemble, client, lane)
+                  call free_slot(ensemble, client, lane)
                   return
                end if
                member%t = integrator%time(lane)
@@ -224,7 +224,7 @@ contains
                return
             end select
             if (allocated(member%error)) then
-               call vacate(ensemble, client, lane)
+               call free_slot(ensemble, client, lane)
                return
             end if
          end do
@@ -237,20 +237,20 @@ contains
       class(ensemble_client), intent(inout) :: client
       integer, intent(in) :: lane
       real(wp), intent(in) :: t, y(:)
-      associate (member => ensemble%seats(lane)%member)
+      associate (member => ensemble%slots(lane)%member)
          call client%observe(member, t, y, member%error)
          member%next = member%next + 1
       end associate
    end subroutine show
 
    !> Hand a case back to the client.
-   subroutine vacate(ensemble, client, lane)
+   subroutine free_slot(ensemble, client, lane)
       type(ensemble_type), intent(inout) :: ensemble
       class(ensemble_client), intent(inout) :: client
       integer, intent(in) :: lane
 
       call share_time(ensemble)
-      associate (member => ensemble%seats(lane)%member, integrator => ensemble%integrator)
+      associate (member => ensemble%slots(lane)%member, integrator => ensemble%integrator)
          member%counts = integrator%statistics(lane)
          if (member%counts%n_starts > 0) then
             member%t = integrator%time(lane)
@@ -259,10 +259,10 @@ contains
          call integrator%leave(lane)
          call ensemble%motion%release(lane)
       end associate
-      call client%finish(ensemble%seats(lane)%member)
-      nullify (ensemble%seats(lane)%member)
+      call client%finish(ensemble%slots(lane)%member)
+      nullify (ensemble%slots(lane)%member)
       call system_clock(ensemble%clock)
-   end subroutine vacate
+   end subroutine free_slot
 
    !> Divide the time since the last call among the lanes in use.
    subroutine share_time(ensemble)
@@ -274,13 +274,13 @@ contains
       call system_clock(now, rate)
       n = 0
       do lane = 1, lanes
-         if (associated(ensemble%seats(lane)%member)) n = n + 1
+         if (associated(ensemble%slots(lane)%member)) n = n + 1
       end do
       share = real(now - ensemble%clock, wp)/real(rate, wp)/max(1, n)
       ensemble%clock = now
       do lane = 1, lanes
-         if (.not. associated(ensemble%seats(lane)%member)) cycle
-         associate (member => ensemble%seats(lane)%member)
+         if (.not. associated(ensemble%slots(lane)%member)) cycle
+         associate (member => ensemble%slots(lane)%member)
             member%seconds = member%seconds + share
          end associate
       end do
@@ -309,13 +309,13 @@ contains
       ensemble%to_look = ensemble%stride
       if (.not. ensemble%stopped) ensemble%stopped = client%stop_requested()
       do lane = 1, lanes
-         if (.not. associated(ensemble%seats(lane)%member)) cycle
-         associate (member => ensemble%seats(lane)%member)
+         if (.not. associated(ensemble%slots(lane)%member)) cycle
+         associate (member => ensemble%slots(lane)%member)
             member%late = member%limit > 0.0_wp .and. member%seconds > member%limit
             if (.not. (ensemble%stopped .or. member%late)) cycle
             call raise(member%error, 'stopped on request at t = '//time_text(ensemble%integrator%time(lane))//' s', exit_stopped)
          end associate
-         call vacate(ensemble, client, lane)
+         call free_slot(ensemble, client, lane)
       end do
    end subroutine look
 

@@ -68,7 +68,7 @@ module rodyn_method_numbers
    real(wp), parameter, public :: stiff_damped_from = 6.0_wp !! likewise where mostly damped [grid]
    real(wp), parameter, public :: stiff_power = 0.25_wp      !! of 1e-3/rtol by which it rises [grid]
    real(wp), parameter, public :: lead = 1.1_wp              !! by which an implicit method must be faster: less accurate [decision]
-   real(wp), parameter, public :: lead_over_events = 2.0_wp  !! likewise where hinges may have events: after each it begins anew, at
+   real(wp), parameter, public :: lead_over_events = 2.0_wp  !! likewise where hinges may have events: after each it restarts, at
                                                              !! order 1 [campaign]
    real(wp), parameter, public :: even_lead = 1.2_wp         !! of collocation over explicit steps without a trial: these gain more
                                                              !! where loads are smooth and excite no fast vibrations [grid]
@@ -110,14 +110,14 @@ module rodyn_method_numbers
    real(wp), parameter, public :: calm_steps = 11.0_wp       !! of order 2 for a radian of the chain at rtol = 1e-3 [grid]
 
    ! Choices in the course of a run
-   real(wp), parameter, public :: probation = 1500.0_wp      !! effort of explicit steps that is not worth a choice [decision]
-   real(wp), parameter, public :: short_probation = 300.0_wp !! likewise where it is known already [decision]
+   real(wp), parameter, public :: choice_delay = 1500.0_wp   !! effort of explicit steps that is not worth a choice [decision]
+   real(wp), parameter, public :: short_delay = 300.0_wp     !! likewise where it is known already [decision]
    real(wp), parameter, public :: trials_free = 3000.0_wp    !! effort that later trials may cost together [decision]
    real(wp), parameter, public :: trial_share = 0.3_wp       !! and this share of the run beside [decision]
    real(wp), parameter, public :: effort_of_rates = 300.0_wp !! of a choice beside its trial: power iterations; not measured
    real(wp), parameter, public :: clear_advantage = 3.0_wp   !! over explicit steps, of an implicit method far ahead [decision]
    real(wp), parameter, public :: postponed = 2.0_wp         !! growth of the run's effort until an inconclusive trial is repeated
    integer, parameter, public :: watch_steps = 200           !! of BDF, after which its pace is judged [decision]
-   integer, parameter, public :: most_verdicts = 64          !! that are remembered [decision]
+   integer, parameter, public :: most_past_choices = 64      !! that are remembered [decision]
 
 end module rodyn_method_numbers

@@ -21,7 +21,7 @@ module rodyn_simulation
       procedure :: time
    end type output_times
 
-   !> Someone who takes down the state at the output times.
+   !> Records the state at the output times.
    type, abstract :: observer_type
    contains
       procedure(observe_interface), deferred :: observe
@@ -85,7 +85,7 @@ contains
    end subroutine check_times
 
    !> Integrate from t = 0 to t_end and show the observer the states at `times`. At each switch of a load or a kink, at
-   !> each release and each event of a hinge the integration stops exactly and starts anew. On failure t and y are the last
+   !> each release and each event of a hinge the integration stops exactly and restarts. On failure t and y are the last
    !> good ones.
    subroutine simulate(motion, integrator, times, t_end, observer, y, t, error)
       type(motion_type), intent(inout), target :: motion
@@ -130,7 +130,7 @@ contains
          if (allocated(error)) return
          if (integrator%at_event .and. same_time(t, t_stop)) t = t_stop ! no method can step from the one to the other
          call observe_now()
-         if (.not. allocated(error)) call integrator%heed_monitor(t, error)
+         if (.not. allocated(error)) call integrator%check_monitor(t, error)
          if (allocated(error) .or. .not. integrator%at_event) return
          call motion%respond(t, integrator%crossed, y, error)
          if (allocated(error) .or. t >= t_stop) return

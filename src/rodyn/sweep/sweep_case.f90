@@ -27,7 +27,7 @@ module rodyn_sweep_case
    use rodyn_text, only: short_text
    implicit none (type, external)
    private
-   public :: case_result, case_shape, pulse_type, keeper_type, build_case, build_values, new_case_shape
+   public :: case_result, case_shape, poller_type, keeper_type, build_case, build_values, new_case_shape
    public :: allocate_result, clear_result, prepare_case, integrate_case, keep_final, conclude_case
    public :: status_done, status_failed, status_stopped
 
@@ -62,23 +62,23 @@ module rodyn_sweep_case
    end type case_result
 
    !> Someone who is shown about 50 times a second that work goes on, and may want it stopped.
-   type, abstract :: pulse_type
+   type, abstract :: poller_type
    contains
-      procedure(beat_interface), deferred :: beat
-   end type pulse_type
+      procedure(poll_interface), deferred :: poll
+   end type poller_type
 
    abstract interface
-      subroutine beat_interface(self, stop_now)
-         import :: pulse_type
+      subroutine poll_interface(self, stop_now)
+         import :: poller_type
          implicit none (type, external)
-         class(pulse_type), intent(inout) :: self
+         class(poller_type), intent(inout) :: self
          logical, intent(out) :: stop_now
-      end subroutine beat_interface
+      end subroutine poll_interface
    end interface
 
-   !> Stops a case that takes too long, or when the pulse says so.
+   !> Stops a case that takes too long, or when the poller says so.
    type, extends(monitor_type) :: case_monitor
-      class(pulse_type), pointer :: pulse => null()
+      class(poller_type), pointer :: poller => null()
       integer(i8) :: clock_start = 0
       real(wp) :: limit = 0.0_wp !! wall time [s]; 0: none
       logical, pointer :: late => null()
@@ -157,7 +157,7 @@ contains
       integer :: a
 
       if (all([(is_ratio(sweep%axes(a)), a=1, size(sweep%axes))])) then
-         config = sweep%base_case ! nothing to read anew
+         config = sweep%base_case ! nothing to read again
       else
          call read_values(sweep, rows, config, error)
          if (allocated(error)) return
@@ -173,7 +173,7 @@ contains
       end do
    end subroutine build_values
 
-   !> The same without mass ratios: keys of the base case set anew, and all read and checked.
+   !> The same without mass ratios: keys of the base case set, and all read and checked.
    subroutine read_values(sweep, rows, config, error)
       type(sweep_config), intent(in) :: sweep
       integer, intent(in) :: rows(:) !! (dimensions)
@@ -259,12 +259,12 @@ contains
    end subroutine make_nan
 
    !> Everything about a case that comes before its integration, frequencies among it. `keeper%kept` is the caller's to set.
-   subroutine prepare_case(sweep, plan, shape, case, pulse, clock_start, setup, times, keeper, driver, late, error)
+   subroutine prepare_case(sweep, plan, shape, case, poller, clock_start, setup, times, keeper, driver, late, error)
       type(sweep_config), intent(in) :: sweep
       type(sweep_plan), intent(in) :: plan
       type(case_shape), intent(in) :: shape
       integer, intent(in) :: case
-      class(pulse_type), target, intent(inout) :: pulse
+      class(poller_type), target, intent(inout) :: poller
       integer(i8), intent(in) :: clock_start         !! when work on the case began [counts]
       type(run_setup), target, intent(inout) :: setup !! must outlive the driver
       real(wp), allocatable, intent(out) :: times(:) !! at which the keeper wants to see it [s]
@@ -282,7 +282,7 @@ contains
       if (sweep%frequencies > 0) call keep_frequencies(setup%motion%dynamics%scene, config, &
                                                        sweep%frequencies_at == 'equilibrium', keeper%kept, error)
       if (allocated(error) .or. .not. sweep%integrate) return
-      monitor = new_monitor(sweep, pulse, clock_start, late)
+      monitor = new_monitor(sweep, poller, clock_start, late)
       call merge_times(config, sweep%probe_times, shape%outputs, times, keeper%probe_of, keeper%output_of)
       call new_driver(driver, setup%motion, setup%y, config%solver, config%t_end, size(times), error, monitor)
       nullify (driver%monitor)
@@ -326,12 +326,12 @@ contains
    end subroutine keep_frequencies
 
    !> Integrate a prepared case by itself, and keep what is wanted.
-   subroutine integrate_case(sweep, driver, setup, times, pulse, clock_start, keeper, late, error)
+   subroutine integrate_case(sweep, driver, setup, times, poller, clock_start, keeper, late, error)
       type(sweep_config), intent(in) :: sweep
       type(driver_type), intent(inout) :: driver !! for this motion
       type(run_setup), target, intent(inout) :: setup
       real(wp), intent(in) :: times(:)          !! at which the keeper wants to see it [s]
-      class(pulse_type), target, intent(inout) :: pulse
+      class(poller_type), target, intent(inout) :: poller
       integer(i8), intent(in) :: clock_start    !! when work on the case began [counts]
       type(keeper_type), intent(inout) :: keeper
       logical, target, intent(out) :: late      !! it took longer than it may
@@ -341,7 +341,7 @@ contains
       integer(i8) :: clock_a, clock_b, clock_rate
 
       late = .false.
-      monitor = new_monitor(sweep, pulse, clock_start, late)
+      monitor = new_monitor(sweep, poller, clock_start, late)
       call driver%set_monitor(monitor)
       call system_clock(clock_a, clock_rate)
       call simulate(setup%motion, driver, listed_times(times), setup%t_end, keeper, setup%y, keeper%kept%t_reached, error)
@@ -515,13 +515,13 @@ contains
       end do
    end subroutine place
 
-   function new_monitor(sweep, pulse, clock_start, late) result(monitor)
+   function new_monitor(sweep, poller, clock_start, late) result(monitor)
       type(sweep_config), intent(in) :: sweep
-      class(pulse_type), target, intent(inout) :: pulse
+      class(poller_type), target, intent(inout) :: poller
       integer(i8), intent(in) :: clock_start
       logical, target, intent(inout) :: late
       type(case_monitor) :: monitor
-      monitor%pulse => pulse
+      monitor%poller => poller
       monitor%clock_start = clock_start
       monitor%limit = sweep%case_seconds
       monitor%late => late
@@ -541,7 +541,7 @@ contains
       logical :: requested
       integer(i8) :: now, rate
 
-      call self%pulse%beat(requested)
+      call self%poller%poll(requested)
       if (requested .or. .not. self%limit > 0.0_wp) return
       call system_clock(now, rate)
       requested = real(now - self%clock_start, wp) > self%limit*real(rate, wp)

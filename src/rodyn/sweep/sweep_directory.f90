@@ -6,7 +6,7 @@
 !>     DIR/status*.txt   how far it is         DIR/sweep.h5   the result
 !>     DIR/sweep.h5.before   the result that --force discards, until the new one is there
 !>
-!> The lock file's bytes are locked: 0 while somebody looks around, 1 by a sweep with all cases, N * 2^20 + I by shard I
+!> The lock file's bytes are locked: 0 while somebody scans around, 1 by a sweep with all cases, N * 2^20 + I by shard I
 !> of N, and 2^50 + rank by the other ranks of an MPI job. The system drops the locks of a process when it ends, however
 !> it ends.
 module rodyn_sweep_directory
@@ -24,19 +24,19 @@ module rodyn_sweep_directory
 
    character(len=*), parameter :: result_name = 'sweep.h5', replaced_name = 'sweep.h5.before'
    character(len=*), parameter :: nl = new_line('a')
-   integer(i8), parameter :: looking = 0, whole = 1, per_count = 2_i8**20, first_rank = 2_i8**50
+   integer(i8), parameter :: scan_byte = 0, whole = 1, per_count = 2_i8**20, first_rank = 2_i8**50
 
    type :: sweep_directory
       character(len=:), allocatable :: path
       type(lock_file) :: lock
       integer(i8) :: fingerprint = 0 !! of the plan
       logical :: resumed = .false.   !! there was a plan already
-      integer, private :: looks = 0  !! calls of `look` without `look_no_more`
+      integer, private :: scans = 0  !! calls of `begin_scan` without `end_scan`
    contains
       procedure :: open => open_directory
       procedure :: lock_rank
-      procedure :: look
-      procedure :: look_no_more
+      procedure :: begin_scan
+      procedure :: end_scan
    end type sweep_directory
 
 contains
@@ -63,26 +63,26 @@ contains
       if (self%lock%pretend .and. n_shards > 0) &
          call raise(error, path//': shards need a file system with locks', exit_bad_input)
       if (allocated(error)) return
-      call self%look()
+      call self%begin_scan()
       call lock_cases(self, shard, n_shards, error)
       if (.not. allocated(error)) call settle_plan(self, plan, force, error)
-      call self%look_no_more()
+      call self%end_scan()
    end subroutine open_directory
 
-   !> Keep others from looking around until `look_no_more`.
-   subroutine look(self)
+   !> Keep others from scanning until `end_scan`.
+   subroutine begin_scan(self)
       class(sweep_directory), intent(inout) :: self
       character(len=:), allocatable :: failure
       logical :: taken
-      if (self%looks == 0) call take_lock(self%lock, looking, 1_i8, .true., taken, failure)
-      self%looks = self%looks + 1
-   end subroutine look
+      if (self%scans == 0) call take_lock(self%lock, scan_byte, 1_i8, .true., taken, failure)
+      self%scans = self%scans + 1
+   end subroutine begin_scan
 
-   subroutine look_no_more(self)
+   subroutine end_scan(self)
       class(sweep_directory), intent(inout) :: self
-      self%looks = self%looks - 1
-      if (self%looks == 0) call release_lock(self%lock, looking, 1_i8)
-   end subroutine look_no_more
+      self%scans = self%scans - 1
+      if (self%scans == 0) call release_lock(self%lock, scan_byte, 1_i8)
+   end subroutine end_scan
 
    !> Nobody else may work on the same cases.
    subroutine lock_cases(self, shard, n_shards, error)

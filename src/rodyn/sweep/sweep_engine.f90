@@ -1,4 +1,4 @@
-!> `rodyn sweep`: who computes which case, and what is told of it.
+!> `rodyn sweep`: who computes which case, and what is reported of it.
 !>
 !> All ways of sharing the work (one process, ranks of MPI, shards of a job array, any of them stopped and started again)
 !> leave the same shards but for their cut, and so the same `sweep.h5`.
@@ -64,7 +64,7 @@ module rodyn_sweep_engine
       logical :: ended = .false.               !! none can be fetched
       type(error_type), allocatable :: error   !! results could not be written
    contains
-      procedure :: beat
+      procedure :: poll
       procedure :: next
       procedure :: keep
    end type engine_feed
@@ -149,7 +149,7 @@ contains
       if (engine%ranks%rank > 0 .and. allocated(error)) error%exit_code = exit_code
    end subroutine agree_on_end
 
-   !> A failure of the first rank is one of all, with its exit code, but told by the first alone.
+   !> A failure of the first rank is one of all, with its exit code, but reported by the first alone.
    subroutine share_fault(engine, error)
       type(engine_type), intent(inout) :: engine
       type(error_type), allocatable, intent(inout) :: error !! in: allocated on the first rank only
@@ -379,7 +379,7 @@ contains
       call system_clock(now, rate)
       if (real(now - clock_last, wp) < 0.1_wp*real(rate, wp)) return
       clock_last = now
-      call engine%ranks%poke()
+      call engine%ranks%progress()
       call engine%writer%sync_if_due()
       call share_counts(engine)
       if (engine%ranks%rank == 0) call engine%progress%show(engine%counts)
@@ -398,12 +398,12 @@ contains
    end subroutine share_counts
 
    !> Called from time to time, also from inside a case.
-   subroutine beat(self, stop_now)
+   subroutine poll(self, stop_now)
       class(engine_feed), intent(inout) :: self
       logical, intent(out) :: stop_now
       call look_around(self%engine)
       stop_now = self%engine%stopped
-   end subroutine beat
+   end subroutine poll
 
    !> The next case that nobody has.
    subroutine next(self, ticket, case)
@@ -458,7 +458,7 @@ contains
 
       exit_code = exit_done
       if (engine%counts%failed > 0) exit_code = exit_failed
-      call engine%directory%look()
+      call engine%directory%begin_scan()
       if (engine%options%n_shards > 0) then
          call count_finished(engine, n_finished, error)
          if (.not. allocated(error) .and. n_finished < engine%options%n_shards) then
@@ -467,12 +467,12 @@ contains
                ': '//to_text(engine%counts%done)//' done, '//to_text(engine%counts%failed)//' failed; '// &
                to_text(n_finished)//' of '//to_text(engine%options%n_shards)//' shards are complete, in '// &
                engine%directory%path)
-            call engine%directory%look_no_more()
+            call engine%directory%end_scan()
             return
          end if
       end if
       if (.not. allocated(error)) call verify_and_merge(engine, exit_code, error)
-      call engine%directory%look_no_more()
+      call engine%directory%end_scan()
       if (allocated(error)) call engine%progress%finish('incomplete', engine%counts)
    end subroutine conclude
 

@@ -29,7 +29,7 @@ module rodyn_sweep_forecast
       integer :: n_kept = 0
       logical :: cut = .false.          !! some were cut short or failed
    contains
-      procedure :: beat
+      procedure :: poll
       procedure :: next
       procedure :: keep
    end type sample_feed
@@ -144,13 +144,13 @@ contains
          formatted(1.0e-6_wp*record*plan%n_cases, '(f12.3)')//' MB of sweep.h5')
    end subroutine print_disk
 
-   subroutine beat(self, stop_now)
+   subroutine poll(self, stop_now)
       class(sample_feed), intent(inout) :: self
       logical, intent(out) :: stop_now
       integer(i8) :: now, rate
       call system_clock(now, rate)
       stop_now = self%clock_start > 0 .and. real(now - self%clock_start, wp) > self%patience*real(rate, wp)
-   end subroutine beat
+   end subroutine poll
 
    subroutine next(self, ticket, case)
       class(sample_feed), intent(inout) :: self

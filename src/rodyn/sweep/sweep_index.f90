@@ -7,7 +7,7 @@ module rodyn_sweep_index
    use rodyn_sweep_case, only: case_result, case_shape
    use rodyn_sweep_directory, only: sweep_directory
    use rodyn_sweep_journal, only: journal_content, read_journals, write_journal
-   use rodyn_sweep_mend, only: mend_shard
+   use rodyn_sweep_repair, only: repair_shard
    use rodyn_sweep_notices, only: notice_list
    use rodyn_sweep_record, only: at_attempt, at_case, at_message, at_status, decode_record, is_sound, shortest_record
    use rodyn_sweep_shard, only: header_words, shard_extent, sift_shard
@@ -43,7 +43,7 @@ module rodyn_sweep_index
 
 contains
 
-   !> Read all shards. Those that are damaged, or left open by a dead process, are mended first.
+   !> Read all shards. Those that are damaged, or left open by a dead process, are repaired first.
    subroutine scan(self, directory, shape, n_cases, tag, others, all_shards, notices, error)
       class(sweep_index), intent(out) :: self
       type(sweep_directory), intent(inout) :: directory
@@ -61,18 +61,18 @@ contains
       do
          call read_all(self, directory%fingerprint, shape, n_cases, tag, others, all_shards, faulty)
          if (size(faulty) == 0) exit ! otherwise there are other files then
-         call directory%look()
+         call directory%begin_scan()
          do i = 1, size(faulty)
-            if (.not. allocated(error)) call mend_shard(self%directory, trim(faulty(i)), tag, directory%fingerprint, shape, &
+            if (.not. allocated(error)) call repair_shard(self%directory, trim(faulty(i)), tag, directory%fingerprint, shape, &
                                                         n_cases, notices, error)
          end do
-         call directory%look_no_more()
+         call directory%end_scan()
          if (allocated(error)) return
       end do
       if (all_shards .or. len(others) == 0) call tell_of_missing(self, tag, notices, error)
    end subroutine scan
 
-   !> Read and verify, and list what has to be mended.
+   !> Read and verify, and list what has to be repaired.
    subroutine read_all(self, fingerprint, shape, n_cases, tag, others, all_shards, faulty)
       class(sweep_index), intent(inout) :: self
       integer(i8), intent(in) :: fingerprint

@@ -42,7 +42,7 @@ contains
 
    !> Write the result, and put it onto the disk. All cases that are computed must have a result in the index.
    subroutine merge_sweep(path, sweep, plan, shape, index, error)
-      character(len=*), intent(in) :: path !! temporary; what a killed merge left there is written anew
+      character(len=*), intent(in) :: path !! temporary; what a killed merge left there is rewritten
       type(sweep_config), intent(in) :: sweep
       type(sweep_plan), intent(in) :: plan
       type(case_shape), intent(in) :: shape

@@ -34,7 +34,7 @@ module rodyn_sweep_ranks
       procedure :: start
       procedure :: finish
       procedure :: add
-      procedure :: poke
+      procedure :: progress
       procedure :: wait_for_all
       procedure :: share_text
       procedure :: share_integers
@@ -97,12 +97,12 @@ contains
    end function add
 
    !> Let MPI work on what other ranks ask of this one, where the network cannot do that by itself.
-   subroutine poke(self)
+   subroutine progress(self)
       class(rank_group), intent(inout) :: self
       logical :: there
       if (.not. self%parallel) return
       call mpi_iprobe(mpi_any_source, mpi_any_tag, mpi_comm_world, there, mpi_status_ignore)
-   end subroutine poke
+   end subroutine progress
 
    subroutine wait_for_all(self)
       class(rank_group), intent(in) :: self

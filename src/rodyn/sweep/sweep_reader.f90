@@ -7,7 +7,7 @@ module rodyn_sweep_reader
    use rodyn_kinds, only: i8, wp
    use rodyn_case_config, only: case_config, case_schema
    use rodyn_case_reader, only: case_from_document
-   use rodyn_checked_document, only: checked_document, blame, entry_of, instances, is_given, is_sound, match_document
+   use rodyn_checked_document, only: checked_document, report, entry_of, instances, is_given, is_sound, match_document
    use rodyn_defaults_writer, only: defaults_writer, new_defaults_writer
    use rodyn_document_checks, only: check_document
    use rodyn_errors, only: error_type
@@ -88,15 +88,15 @@ contains
          sweep%base_text = input%base_text
          sweep%base_name = input%base_name
       else if (entry_of(checked, 'sweep', 1, 'base') == 0) then
-         return ! which was told
+         return ! which was reported
       else if (len_trim(sweep%base) == 0) then
-         call blame(checked, 'sweep', 1, 'base', 'must not be empty')
+         call report(checked, 'sweep', 1, 'base', 'must not be empty')
       else
          sweep%base_name = sweep%base
          if (index(sweep%base, '/') /= 1 .and. input%directory /= '.') sweep%base_name = input%directory//'/'//sweep%base
          call read_text_file(sweep%base_name, sweep%base_text, failure)
          found = .not. allocated(failure)
-         if (.not. found) call blame(checked, 'sweep', 1, 'base', failure%message)
+         if (.not. found) call report(checked, 'sweep', 1, 'base', failure%message)
       end if
    end subroutine read_base
 
@@ -125,16 +125,16 @@ contains
          sweep%probe_times = [sweep%base_case%t_end]
       do i = 2, size(sweep%probe_times)
          if (sweep%probe_times(i) > sweep%probe_times(i - 1)) cycle
-         call blame(checked, 'sweep', 1, 'probe_times', 'must increase, but value '//to_text(i)//' does not')
+         call report(checked, 'sweep', 1, 'probe_times', 'must increase, but value '//to_text(i)//' does not')
          exit
       end do
 
       if (sweep%frequencies_at == 'equilibrium' .and. sweep%frequencies == 0) &
-         call blame(checked, 'sweep', 1, 'frequencies_at', 'applies only with frequencies')
+         call report(checked, 'sweep', 1, 'frequencies_at', 'applies only with frequencies')
       if (.not. sweep%integrate) then
-         if (sweep%frequencies == 0) call blame(checked, 'sweep', 1, 'integrate', &
+         if (sweep%frequencies == 0) call report(checked, 'sweep', 1, 'integrate', &
                                                 'leaves nothing to compute unless frequencies is positive')
-         if (sweep%keep_series) call blame(checked, 'sweep', 1, 'keep_series', 'needs integrate = .true.')
+         if (sweep%keep_series) call report(checked, 'sweep', 1, 'keep_series', 'needs integrate = .true.')
       end if
       n_axes = instances(checked, 'axis')
       allocate (sweep%axes(n_axes), given(n_axes))
@@ -175,32 +175,32 @@ contains
       call move_alloc(keys%text_values, axis%texts)
       axis%key = squeezed(keys%key)
       if (axis%key == '' .and. entry_of(checked, 'axis', i, 'key') > 0) &
-         call blame(checked, 'axis', i, 'key', 'must not be empty')
+         call report(checked, 'axis', i, 'key', 'must not be empty')
 
       by_values = given('values')
       by_texts = given('text_values')
       by_range = given('start') .or. given('stop') .or. given('count')
       axis%textual = by_texts
       if (count([by_values, by_texts, by_range]) /= 1) then
-         call blame(checked, 'axis', i, 'key', 'takes its values from one of: values; text_values; start, stop and count')
+         call report(checked, 'axis', i, 'key', 'takes its values from one of: values; text_values; start, stop and count')
       else if (by_range) then
          do k = 1, 3
-            if (.not. given(trim(range_keys(k)))) call blame(checked, 'axis', i, trim(range_keys(k)), &
+            if (.not. given(trim(range_keys(k)))) call report(checked, 'axis', i, trim(range_keys(k)), &
                'is required where the others of start, stop and count are given')
          end do
          if (.not. all([is_sound(checked, 'axis', i, 'start'), is_sound(checked, 'axis', i, 'stop'), &
                         is_sound(checked, 'axis', i, 'count'), is_sound(checked, 'axis', i, 'spacing')])) return
-         if (keys%count < 1) return ! `count` is missing, which was told above
+         if (keys%count < 1) return ! `count` is missing, which was reported above
          if (keys%spacing == 'log' .and. .not. (keys%start > 0.0_wp .and. keys%stop > 0.0_wp)) then
-            call blame(checked, 'axis', i, 'spacing', 'needs positive start and stop')
+            call report(checked, 'axis', i, 'spacing', 'needs positive start and stop')
          else if (keys%count == 1 .and. abs(keys%stop - keys%start) > 0.0_wp) then
-            call blame(checked, 'axis', i, 'count', 'one value cannot be both start and stop')
+            call report(checked, 'axis', i, 'count', 'one value cannot be both start and stop')
          else
             axis%numbers = spaced(keys%start, keys%stop, keys%count, keys%spacing == 'log')
          end if
       end if
       if (keys%spacing == 'log' .and. .not. by_range) &
-         call blame(checked, 'axis', i, 'spacing', 'applies only with start, stop and count')
+         call report(checked, 'axis', i, 'spacing', 'applies only with start, stop and count')
 
    contains
 
@@ -313,7 +313,7 @@ contains
 
       subroutine refuse(key, rule)
          character(len=*), intent(in) :: key, rule
-         call blame(checked, 'axis', i, key, rule)
+         call report(checked, 'axis', i, key, rule)
          sound = .false.
       end subroutine refuse
 
@@ -347,9 +347,9 @@ contains
          if (len(rule) == 0) cycle
          axis%bad(k) = .true.
          n_bad = n_bad + 1
-         if (n_bad <= most_told) call blame(checked, 'axis', i, key, 'value '//to_text(k)//' ('//told(k)//') '//rule)
+         if (n_bad <= most_told) call report(checked, 'axis', i, key, 'value '//to_text(k)//' ('//told(k)//') '//rule)
       end do
-      if (n_bad > most_told) call blame(checked, 'axis', i, key, 'and '//to_text(n_bad - most_told)//' more of its values')
+      if (n_bad > most_told) call report(checked, 'axis', i, key, 'and '//to_text(n_bad - most_told)//' more of its values')
 
    contains
 
@@ -387,16 +387,16 @@ contains
       if (n == 1) has = 'the base has one group &'//group
       if (.not. repeatable) then
          ok = instance == 0
-         if (.not. ok) call blame(checked, 'axis', i, 'key', '&'//group//' is not repeatable: write '//group//'.'//name)
+         if (.not. ok) call report(checked, 'axis', i, 'key', '&'//group//' is not repeatable: write '//group//'.'//name)
       else if (n == 0) then
          ok = .false.
-         call blame(checked, 'axis', i, 'key', 'the base has no group &'//group)
+         call report(checked, 'axis', i, 'key', 'the base has no group &'//group)
       else if (instance > n) then
          ok = .false.
-         call blame(checked, 'axis', i, 'key', has//'; the index counts them in the order of the file')
+         call report(checked, 'axis', i, 'key', has//'; the index counts them in the order of the file')
       else if (instance == 0 .and. n > 1) then
          ok = .false.
-         call blame(checked, 'axis', i, 'key', has//'; specify one, as in '//group//'(1).'//name)
+         call report(checked, 'axis', i, 'key', has//'; specify one, as in '//group//'(1).'//name)
       end if
    end subroutine check_instance
 
@@ -421,10 +421,10 @@ contains
 
       do i = 1, size(sweep%axes)
          if (index(sweep%axes(i)%key, 'chain.node_mass') == 1 .and. any(sweep%axes%key == 'mass_ratio')) &
-            call blame(checked, 'axis', i, 'key', 'mass_ratio already sets the node masses')
+            call report(checked, 'axis', i, 'key', 'mass_ratio already sets the node masses')
          do k = 1, i - 1
             if (full_key(trim(sweep%axes(k)%key)) /= full_key(trim(sweep%axes(i)%key))) cycle
-            call blame(checked, 'axis', i, 'key', 'the key already has an axis')
+            call report(checked, 'axis', i, 'key', 'the key already has an axis')
             exit
          end do
       end do
@@ -445,7 +445,7 @@ contains
             do k = 1, i - 1
                if (sweep%axes(k)%key == squeezed(keys(i)%along)) partner = k
             end do
-            if (partner == 0) call blame(checked, 'axis', i, 'along', 'no axis above has this key')
+            if (partner == 0) call report(checked, 'axis', i, 'along', 'no axis above has this key')
          else if (sweep%combine == 'zip') then
             partner = findloc(sweep%axes(:i - 1)%dimension > 0, .true., 1)
          end if
@@ -461,7 +461,7 @@ contains
          if (axis_size(sweep%axes(i)) == axis_size(sweep%axes(partner))) then
             sweep%axes(i)%dimension = sweep%axes(partner)%dimension
          else
-            call blame(checked, 'axis', i, 'key', &
+            call report(checked, 'axis', i, 'key', &
                'has '//to_text(axis_size(sweep%axes(i)))//' values, but '//trim(sweep%axes(partner)%key)// &
                ', with which it advances, has '//to_text(axis_size(sweep%axes(partner))))
          end if
@@ -475,7 +475,7 @@ contains
       type(sweep_config), intent(inout) :: sweep
       integer :: reference(sweep%n_dimensions), at(sweep%n_dimensions)
       integer :: d, i, n, n_refused, n_tried, n_values, row
-      logical :: conflict !! one of values that are fine by themselves was told
+      logical :: conflict !! one of values that are fine by themselves was reported
       character(len=:), allocatable :: why
 
       call find_reference(sweep, reference)
@@ -495,10 +495,10 @@ contains
             call judge(sweep, d, at, conflict, why)
             if (len(why) == 0) cycle
             n_refused = n_refused + 1
-            call blame(checked, 'axis', culprit(sweep, d, row), 'key', 'value '//to_text(row)//' ('// &
-                       shown_value(sweep%axes(culprit(sweep, d, row)), row)//') '//why)
+            call report(checked, 'axis', faulty_axis(sweep, d, row), 'key', 'value '//to_text(row)//' ('// &
+                       shown_value(sweep%axes(faulty_axis(sweep, d, row)), row)//') '//why)
             if (n_refused < most_told .or. i == min(n, most_tried)) cycle
-            call blame(checked, 'axis', culprit(sweep, d, row), 'key', 'further values were not tried')
+            call report(checked, 'axis', faulty_axis(sweep, d, row), 'key', 'further values were not tried')
             exit
          end do
       end do
@@ -513,7 +513,7 @@ contains
       type(sweep_config), intent(in) :: sweep
       integer, intent(in) :: d             !! dimension
       integer, intent(in) :: at(:)         !! its row, and accepted ones of the others
-      logical, intent(inout) :: conflict   !! one was told, which the other axes need not repeat
+      logical, intent(inout) :: conflict   !! one was reported, which the other axes need not repeat
       character(len=:), allocatable, intent(out) :: why
       type(case_config) :: config
       type(error_type), allocatable :: error, alone_error
@@ -603,7 +603,7 @@ contains
       dimension_size = axis_size(sweep%axes(findloc(sweep%axes%dimension, d, 1)))
    end function dimension_size
 
-   !> Does a value of the row break the rule of its own key, or is the key itself at fault, which has been told?
+   !> Does a value of the row break the rule of its own key, or is the key itself at fault, which has been reported?
    pure logical function is_bad(sweep, d, row)
       type(sweep_config), intent(in) :: sweep
       integer, intent(in) :: d, row
@@ -618,7 +618,7 @@ contains
    end function is_bad
 
    !> Which axis of a dimension is at fault: the first that the base refuses alone, or the first one.
-   integer function culprit(sweep, d, row)
+   integer function faulty_axis(sweep, d, row)
       type(sweep_config), intent(in) :: sweep
       integer, intent(in) :: d, row
       type(sweep_config) :: single
@@ -626,16 +626,16 @@ contains
       type(error_type), allocatable :: error
 
       if (count(sweep%axes%dimension == d) > 1) then
-         do culprit = 1, size(sweep%axes)
-            if (sweep%axes(culprit)%dimension /= d) cycle
+         do faulty_axis = 1, size(sweep%axes)
+            if (sweep%axes(faulty_axis)%dimension /= d) cycle
             single = sweep
             single%axes%dimension = 0
-            single%axes(culprit)%dimension = 1
+            single%axes(faulty_axis)%dimension = 1
             call build_values(single, [row], config, error)
             if (allocated(error)) return
          end do
       end if
-      culprit = findloc(sweep%axes%dimension, d, 1)
-   end function culprit
+      faulty_axis = findloc(sweep%axes%dimension, d, 1)
+   end function faulty_axis
 
 end module rodyn_sweep_reader

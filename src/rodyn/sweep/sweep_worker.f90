@@ -14,7 +14,7 @@ module rodyn_sweep_worker
    use rodyn_methods, only: method_named, method_type
    use rodyn_scene, only: scene_type
    use rodyn_sweep_case, only: case_result, case_shape, clear_result, conclude_case, integrate_case, keep_final, keeper_type, &
-      prepare_case, pulse_type
+      prepare_case, poller_type
    use rodyn_sweep_config, only: sweep_config
    use rodyn_sweep_plan, only: fewest_alike, sweep_plan
    use rodyn_text, only: to_text
@@ -26,7 +26,7 @@ module rodyn_sweep_worker
    integer, parameter :: most_waiting = 4*lanes    !! cases that wait for others of their kind
 
    !> Hands out cases and takes their results.
-   type, extends(pulse_type), abstract :: case_feed
+   type, extends(poller_type), abstract :: case_feed
    contains
       procedure(next_interface), deferred :: next
       procedure(keep_interface), deferred :: keep
@@ -201,7 +201,7 @@ contains
       integer :: ticket, case
 
       nullify (new)
-      call self%feed%beat(self%stopped)
+      call self%feed%poll(self%stopped)
       if (self%stopped) return
       call self%feed%next(ticket, case)
       self%ended = case == 0
@@ -305,7 +305,7 @@ contains
    function stop_requested(self) result(requested)
       class(worker_type), intent(inout) :: self
       logical :: requested
-      if (.not. self%stopped) call self%feed%beat(self%stopped)
+      if (.not. self%stopped) call self%feed%poll(self%stopped)
       requested = self%stopped
    end function stop_requested
 

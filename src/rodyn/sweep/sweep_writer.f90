@@ -131,7 +131,7 @@ contains
       if (real(now - self%clock_waiting, wp) >= self%wait()*real(rate, wp)) call self%sync()
    end subroutine sync_if_due
 
-   !> Sync. A failure is told by the next `add` or `seal`.
+   !> Sync. A failure is reported by the next `add` or `seal`.
    subroutine sync(self)
       class(shard_writer), intent(inout) :: self
       if (self%clock_waiting == 0) return

@@ -2,7 +2,7 @@
 !>
 !> One that was left open and is good to its end is sealed, as its writer would have done. Of any other the good records
 !> go into a new shard, and the file itself stays, under the name NAME-1.damaged.
-module rodyn_sweep_mend
+module rodyn_sweep_repair
    use rodyn_kinds, only: i8
    use rodyn_errors, only: error_type, raise
    use rodyn_growing_file, only: growing_file
@@ -16,12 +16,12 @@ module rodyn_sweep_mend
    use rodyn_text, only: ends_with, to_text
    implicit none (type, external)
    private
-   public :: mend_shard
+   public :: repair_shard
 
 contains
 
-   !> Mend one. No living process may write it, and no other may mend it now.
-   subroutine mend_shard(directory, name, tag, fingerprint, shape, n_cases, notices, error)
+   !> Repair one. No living process may write it, and no other may repair it now.
+   subroutine repair_shard(directory, name, tag, fingerprint, shape, n_cases, notices, error)
       character(len=*), intent(in) :: directory
       character(len=*), intent(in) :: name !! of the shard, perhaps with `open_ending`
       character(len=*), intent(in) :: tag  !! of the journal
@@ -36,7 +36,7 @@ contains
       logical :: left_open, torn
 
       path = directory//'/shards/'//name
-      if (.not. path_exists(path)) return ! another process has mended it
+      if (.not. path_exists(path)) return ! another process has repaired it
       call read_words(path, words, torn)
       call sift_shard(words, fingerprint, shape, n_cases, extent, fault)
       if (torn .and. len(fault) == 0) fault = 'torn'
@@ -56,7 +56,7 @@ contains
          if (.not. allocated(error)) call notices%tell('shard '//name//': '//fault//'; set aside, '// &
             to_text(extent%n_records)//' intact results of it are kept')
       end if
-   end subroutine mend_shard
+   end subroutine repair_shard
 
    !> Seal a shard that was left open.
    subroutine finish(directory, name, tag, header, extent, error)
@@ -119,4 +119,4 @@ contains
       end do
    end function free_name
 
-end module rodyn_sweep_mend
+end module rodyn_sweep_repair

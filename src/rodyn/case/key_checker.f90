@@ -1,48 +1,48 @@
 !> What the rules of a case ask of its keys, and whom they tell of faults. A document knows what is written in which line
 !> (`rodyn_checked_document`); a case in memory has values only (`rodyn_case_check`).
-module rodyn_key_judge
+module rodyn_key_checker
    use rodyn_text, only: to_text
    implicit none (type, external)
    private
-   public :: key_judge, no_such
+   public :: key_checker, no_such
 
-   type, abstract :: key_judge
+   type, abstract :: key_checker
    contains
       procedure(ask_interface), deferred :: is_given
       procedure(ask_interface), deferred :: is_sound
-      procedure(blame_interface), deferred :: blame
+      procedure(report_interface), deferred :: report
       procedure :: require
-   end type key_judge
+   end type key_checker
 
    abstract interface
       !> Is the key given, rightly or wrongly? Or: does nothing that is given for it break a rule of its own?
       logical function ask_interface(self, group, instance, key)
-         import :: key_judge
+         import :: key_checker
          implicit none (type, external)
-         class(key_judge), intent(in) :: self
+         class(key_checker), intent(in) :: self
          character(len=*), intent(in) :: group, key
          integer, intent(in) :: instance !! which of the groups of that name
       end function ask_interface
 
       !> Note a fault of a key.
-      subroutine blame_interface(self, group, instance, key, rule)
-         import :: key_judge
+      subroutine report_interface(self, group, instance, key, rule)
+         import :: key_checker
          implicit none (type, external)
-         class(key_judge), intent(inout) :: self
+         class(key_checker), intent(inout) :: self
          character(len=*), intent(in) :: group, key, rule
          integer, intent(in) :: instance
-      end subroutine blame_interface
+      end subroutine report_interface
    end interface
 
 contains
 
    !> Note a key that is not given but must be.
    subroutine require(self, group, instance, key, when)
-      class(key_judge), intent(inout) :: self
+      class(key_checker), intent(inout) :: self
       character(len=*), intent(in) :: group, key
       integer, intent(in) :: instance
       character(len=*), intent(in) :: when !! as in 'is required '//when; empty: always
-      if (.not. self%is_given(group, instance, key)) call self%blame(group, instance, key, trim('is required '//when))
+      if (.not. self%is_given(group, instance, key)) call self%report(group, instance, key, trim('is required '//when))
    end subroutine require
 
    !> The fault of a number that no rod, node, hinge ... has.
@@ -53,4 +53,4 @@ contains
       rule = 'there is no such '//what//'; the numbers are '//to_text(first)//'..'//to_text(last)
    end function no_such
 
-end module rodyn_key_judge
+end module rodyn_key_checker
