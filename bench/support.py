@@ -22,7 +22,8 @@ def run_case(program: str, case: str, result: pathlib.Path) -> str:
     """Run a case into a run file; what went wrong, or nothing."""
     source = result.with_suffix(".nml")
     source.write_text(case)
-    done = subprocess.run([program, "run", str(source), "--output", str(result), "--force", "--quiet"], capture_output=True, text=True, check=False)
+    command = [program, "run", str(source), "--output", str(result), "--force", "--quiet"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     return done.stderr.strip() or f"exit code {done.returncode}" if done.returncode else ""
 
 

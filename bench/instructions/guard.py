@@ -20,7 +20,7 @@ import subprocess
 import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
-from support import ROOT, benchmark  # noqa: E402
+from support import ROOT, benchmark
 
 COUNTS = pathlib.Path(__file__).with_name("counts.json")
 TOLERANCE = 1.01

@@ -42,9 +42,9 @@ import h5py
 import numpy as np
 
 sys.path[:0] = [str(pathlib.Path(__file__).resolve().parents[i]) for i in (0, 1)]
-import multipliers
-from ordinary_scenes import FAMILIES, Group, Typist, groups_of, text_of
-from support import ROOT, RODYN
+import multipliers  # noqa: E402
+from ordinary_scenes import FAMILIES, Group, Typist, groups_of, text_of  # noqa: E402
+from support import RODYN, ROOT  # noqa: E402
 
 RESULTS = ROOT / "results" / "stability" / "campaign.jsonl"
 DOCUMENT, MARK = ROOT / "docs" / "stability.md", "<!-- campaign -->\n"

@@ -19,7 +19,7 @@ import tempfile
 import numpy as np
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
-from support import RODYN, run_case, solver  # noqa: E402
+from support import RODYN, run_case, solver
 
 COUNT, SEED = 320, 17
 RTOL = 1e-8

@@ -13,7 +13,7 @@ import threading
 from dataclasses import dataclass
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
-from support import RODYN  # noqa: E402
+from support import RODYN
 
 MEMORY = int(os.environ.get("RODYN_MEMORY") or 4 << 30)  # address space [bytes]; -1: no limit, which the sanitizers need
 FILES = 1 << 30         # of a file [bytes]
