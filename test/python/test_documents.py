@@ -129,13 +129,26 @@ class Page(html.parser.HTMLParser):
         self.text += data
 
 
+@pytest.fixture(scope="module")
+def reports(runs, sweeps, tmp_path_factory, request):
+    """Reports by the name of a run or a sweep, each made once; "n1" with an animation."""
+    place = tmp_path_factory.mktemp("reports")
+
+    @functools.cache
+    def made(name):
+        with pytest.MonkeyPatch.context() as patch:
+            if name in runs and name != "n1" and not request.config.getoption("--all"):  # the pictures themselves are tested elsewhere
+                patch.setattr(report, "pictures", lambda file: figures.pictures(file)[:1])
+            patch.setattr(report.animate, "plot", functools.partial(report.animate.plot, seconds=0.5))
+            (path,) = report.plot((runs | sweeps)[name], place / f"{name}.html", animation=name == "n1")
+        return path
+
+    return made
+
+
 @pytest.mark.parametrize("name", result_files.SCENES)
-def test_a_report_of_a_run_needs_nothing_else(runs, tmp_path, monkeypatch, request, name):
-    if name != "n1" and not request.config.getoption("--all"):  # the pictures themselves are tested elsewhere
-        monkeypatch.setattr(report, "pictures", lambda file: figures.pictures(file)[:1])
-    monkeypatch.setattr(report.animate, "plot", functools.partial(report.animate.plot, seconds=0.5))
-    (path,) = report.plot(runs[name], tmp_path / "r.html", animation=name == "n1")
-    text = path.read_text(encoding="utf-8")
+def test_a_report_of_a_run_needs_nothing_else(runs, reports, name):
+    text = reports(name).read_text(encoding="utf-8")
     page = Page(text)
     assert page.addresses and all(address.startswith("data:image/") for address in page.addresses)
     assert not {"script", "link", "iframe", "object"} & set(page.tags)
@@ -151,18 +164,17 @@ def test_a_report_of_a_run_needs_nothing_else(runs, tmp_path, monkeypatch, reque
 
 
 @pytest.mark.parametrize("name", ["inertia", "inertia_failed", "grid", "orders", "all_failed"])
-def test_a_report_of_a_sweep_lists_its_failures(sweeps, tmp_path, name):
-    (path,) = report.plot(sweeps[name], tmp_path / "r.html")
-    page = Page(path.read_text(encoding="utf-8"))
+def test_a_report_of_a_sweep_lists_its_failures(reports, name):
+    page = Page(reports(name).read_text(encoding="utf-8"))
     failures = {"inertia": 0, "inertia_failed": 1, "grid": 3, "orders": 1, "all_failed": 3}[name]
     assert page.text.count("step size too small") == failures
     assert page.addresses or name == "all_failed"
 
 
 @pytest.mark.parametrize("name", ["n1", "inertia_failed"])
-def test_a_report_opens_in_a_browser(runs, sweeps, tmp_path, name):
+def test_a_report_opens_in_a_browser(reports, tmp_path, name):
     assert BROWSER, "no Chromium on the PATH: install one, or name it in RODYN_BROWSER"
-    (path,) = report.plot((runs | sweeps)[name], tmp_path / "r.html")
+    path = reports(name)
     quiet = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
              "--disable-component-update", "--disable-sync", f"--user-data-dir={tmp_path / 'profile'}", "--window-size=1000,1400"]
     picture = tmp_path / "page.png"

@@ -27,7 +27,12 @@ def line_data(axes, label=None):
     return [np.asarray(line.get_xydata()) for line in axes.lines if label is None or line.get_label() == label]
 
 
-@pytest.mark.parametrize("name", result_files.SCENES)
+DRAWN_QUICKLY = ["n4", "n40", "failed", "no_ledger"]  # one of each set of pictures
+
+
+@pytest.mark.parametrize("name", [
+    pytest.param(name, marks=[] if name in DRAWN_QUICKLY else pytest.mark.long) for name in result_files.SCENES
+])
 def test_every_picture_of_every_scene_is_drawn(runs, tmp_path, monkeypatch, name):
     formats = style.FORMATS if name == "n4" else (".png",)
     monkeypatch.setattr(style, "FORMATS", formats)

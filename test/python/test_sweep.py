@@ -176,8 +176,8 @@ def test_a_hinge_is_held_or_not(here):
     ("load(1).value", "the base has no group &load"),
     ("chain(1).length", "&chain is not repeatable: write chain.length"),
     ("chain.length(4)", "there is no such rod; the numbers are 1..3"),
-    ("kink_program(2).values(4)", "there is no such element; the list has 3, numbered from 1"),
-    ("rod_profile(1).values(1)", "the base gives no list whose element this could be"),
+    ("kink_program(2).values(4)", "there is no such element; the array has 3, numbered from 1"),
+    ("rod_profile(1).values(1)", "the base has no array with such an element"),
 ])
 def test_groups_and_elements_that_are_not_there(here, key, message):
     (here / "base.nml").write_text(MOVING)
