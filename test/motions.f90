@@ -6,11 +6,18 @@ module test_motions
    use rodyn_kinematics, only: invariants_type
    use rodyn_motion, only: motion_type, new_motion, initial_state, state_invariants
    use rodyn_scene, only: scene_type, new_scene
+   use rodyn_user_load, only: user_load
    use test_random_scenes, only: random_case
    use test_testing, only: check
    implicit none (type, external)
    private
-   public :: motion_of, random_motion, check_jacobian, check_energy_rate, eigenvector_error
+   public :: idle_load, motion_of, random_motion, check_jacobian, check_energy_rate, eigenvector_error
+
+   !> Does nothing, but has switches.
+   type, extends(user_load) :: idle_load
+   contains
+      procedure :: add_forces
+   end type idle_load
 
 contains
 
@@ -32,6 +39,14 @@ contains
       call motion%dynamics%set_regime(0.0_wp, 1.0_wp)
       call initial_state(motion, config%initial, y)
    end subroutine motion_of
+
+   subroutine add_forces(self, scene, t, q, p, base, node)
+      class(idle_load), intent(inout) :: self
+      type(scene_type), intent(in) :: scene
+      real(wp), intent(in) :: t, q(:), p(:)
+      real(wp), intent(inout) :: base(3), node(:, :)
+      associate (u1 => self, u2 => scene, u3 => t, u4 => q, u5 => p, u6 => base, u7 => node); end associate
+   end subroutine add_forces
 
    !> A random scene with its initial state and loads; no load is switched within (0, 1).
    subroutine random_motion(motion, y, which, n, kernel, error)

@@ -2,7 +2,8 @@
 module test_step_limit
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type, exit_bad_input
-   use rodyn_case_config, only: case_config
+   use rodyn_case_config, only: case_config, solver_config
+   use rodyn_driver, only: driver_type, new_driver
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_motion, only: motion_type, new_motion, initial_state, state_invariants
    use rodyn_kinematics, only: invariants_type
@@ -12,6 +13,7 @@ module test_step_limit
    use rodyn_integrators, only: new_integrator
    use rodyn_stability_function, only: stability_function, stability_function_of
    use rodyn_step_limit, only: check_fixed_step, growth_in_run, largest_stable_step
+   use test_motions, only: idle_load
    use test_oscillators, only: oscillator, new_oscillator
    use test_random_scenes, only: random_case, seed_random, n_kinds, kind_name
    use test_testing, only: unittest, new_test, check, check_close
@@ -332,7 +334,7 @@ contains
          call initial_state(motion, config%initial, y)
          do i = 1, size(methods)
             options = solver_options(order=orders(i), fixed_step=0.1_wp)
-            call check_fixed_step(trim(methods(i)), options, scene, y, 10.0_wp, refusal)
+            call check_fixed_step(trim(methods(i)), options, scene, scene%switches, y, 10.0_wp, refusal)
             call check(error, allocated(refusal), 'not refused')
             if (allocated(error)) return
             call check(error, refusal%exit_code, exit_bad_input, 'exit code')
@@ -341,30 +343,33 @@ contains
             call check(error, at > 0, 'no limit in: '//refusal%message)
             if (allocated(error)) return
             read (refusal%message(at + len(words):), *) options%fixed_step
-            call check_fixed_step(trim(methods(i)), options, scene, y, 10.0_wp, refusal)
+            call check_fixed_step(trim(methods(i)), options, scene, scene%switches, y, 10.0_wp, refusal)
             call check(error, .not. allocated(refusal), 'the limit itself is refused')
             if (allocated(error)) return
             options%fixed_step = 0.1_wp
             options%allow_unstable = .true.
-            call check_fixed_step(trim(methods(i)), options, scene, y, 10.0_wp, refusal)
+            call check_fixed_step(trim(methods(i)), options, scene, scene%switches, y, 10.0_wp, refusal)
             call check(error, .not. allocated(refusal), 'refused although allowed')
             if (allocated(error)) return
          end do
          options = solver_options(fixed_step=0.1_wp)
-         call check_fixed_step('gauss', options, scene, y, 10.0_wp, refusal)
+         call check_fixed_step('gauss', options, scene, scene%switches, y, 10.0_wp, refusal)
          call check(error, .not. allocated(refusal), 'gauss refused')
          if (allocated(error)) return
       end do
    end subroutine refusals
 
-   !> Half as long again as the limit, but a table's knots end the steps at 0.9 of it.
+   !> Half as long again as the limit, but a table's knots, or the switches of a user's load, end the steps at 0.9 of it.
    subroutine shortened_steps(error)
       type(error_type), allocatable, intent(out) :: error
       type(case_config) :: config
       real(wp) :: limit
+      type(idle_load), target :: load
+      logical :: watched
       integer, parameter :: n = 100
       integer :: i
 
+      watched = .false.
       call seed_random(45)
       call random_case(config, 1, 3)
       config%t_end = 10.0_wp
@@ -377,6 +382,14 @@ contains
       config%kink_programs(1)%times = [(config%t_end*(real(i, wp)/n), i=0, n)]
       config%kink_programs(1)%values = [(0.0_wp, i=0, n)]
       call check(error, limit_of(1.5_wp*limit) >= huge(limit), 'shorter steps are refused')
+      if (allocated(error)) return
+      load%switches = config%kink_programs(1)%times
+      deallocate (config%kink_programs)
+      allocate (config%kink_programs(0))
+      call check(error, limit_of(1.5_wp*limit) < huge(limit), 'a step above the limit is accepted again')
+      if (allocated(error)) return
+      watched = .true.
+      call check(error, limit_of(1.5_wp*limit) >= huge(limit), 'steps between switches of a user''s load are refused')
 
    contains
 
@@ -384,7 +397,8 @@ contains
       real(wp) function limit_of(step)
          real(wp), intent(in) :: step
          type(scene_type) :: scene
-         type(motion_type) :: motion
+         type(motion_type), target :: motion
+         type(driver_type) :: driver
          type(error_type), allocatable :: refusal
          real(wp), allocatable :: y(:)
          character(len=*), parameter :: words = 'with steps above '
@@ -394,7 +408,8 @@ contains
          if (.not. allocated(refusal)) call new_motion(motion, scene, .false., refusal)
          if (allocated(refusal)) return
          call initial_state(motion, config%initial, y)
-         call check_fixed_step('dop853', solver_options(fixed_step=step), scene, y, config%t_end, refusal)
+         if (watched) call motion%set_user_load(load)
+         call new_driver(driver, motion, y, solver_config(method='dop853', fixed_step=step), config%t_end, 1, refusal)
          limit_of = huge(limit_of)
          if (.not. allocated(refusal)) return
          read (refusal%message(index(refusal%message, words) + len(words):), *) limit_of

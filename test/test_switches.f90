@@ -9,7 +9,7 @@ module test_switches
    use rodyn_switch_times, only: add_switches, interval_ends, same_time
    use rodyn_text, only: word, word_count
    use rodyn_time_law, only: law_config, law_words, new_time_law, time_law, value_at
-   use rodyn_user_load, only: user_load
+   use test_motions, only: idle_load
    use test_testing, only: unittest, new_test, check, check_close
    use test_trajectories, only: trajectory, integrate
    implicit none (type, external)
@@ -22,12 +22,6 @@ module test_switches
       'hinge_damping = 0.5, node_mass = 0.5 /'//nl
    character(len=6), parameter :: methods(5) = [character(len=6) :: 'adams', 'bdf', 'erk', 'dop853', 'gauss']
    character(len=*), parameter :: after_0_3 = '0.30000000000000004' !! the next number
-
-   !> Does nothing, but has switches.
-   type, extends(user_load) :: idle_load
-   contains
-      procedure :: add_forces
-   end type idle_load
 
 contains
 
@@ -155,14 +149,6 @@ contains
          end do
       end do
    end subroutine test_end_of_run
-
-   subroutine add_forces(self, scene, t, q, p, base, node)
-      class(idle_load), intent(inout) :: self
-      type(scene_type), intent(in) :: scene
-      real(wp), intent(in) :: t, q(:), p(:)
-      real(wp), intent(inout) :: base(3), node(:, :)
-      associate (u1 => self, u2 => scene, u3 => t, u4 => q, u5 => p, u6 => base, u7 => node); end associate
-   end subroutine add_forces
 
    subroutine test_user_switches(error)
       type(error_type), allocatable, intent(out) :: error

@@ -5,7 +5,7 @@ module rodyn_faults
    use rodyn_text_buffer, only: text_buffer
    implicit none (type, external)
    private
-   public :: fault_list, max_shown
+   public :: fault_list
 
    integer, parameter :: max_shown = 1000 !! a broken table of a million values is not worth a million lines
 

@@ -69,7 +69,7 @@ contains
       type(dynamics_type), intent(out) :: dynamics
       type(scene_type), intent(in) :: scene
       type(error_type), allocatable, intent(out) :: error
-      type(hinge_law), intent(in), optional :: hinges !! as they are now; absent: as they are when a run begins
+      type(hinge_law), intent(in), optional :: hinges !! as they are now, driven kinks at t = 0; absent: as when a run begins
 
       dynamics%scene = scene
       dynamics%hinges = scene%hinges

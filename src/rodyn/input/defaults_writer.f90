@@ -58,7 +58,11 @@ contains
       class(defaults_writer), intent(inout) :: self
       real(wp), intent(inout) :: x
       type(schema_row), intent(in) :: row
-      call put(self, row, decimal(x))
+      if (len_trim(row%default) > 0) then ! x is what stands for 'not given', perhaps too large for a text of fewer digits
+         call put(self, row, '')
+      else
+         call put(self, row, decimal(x))
+      end if
    end subroutine real_field
 
    subroutine array_field(self, x, row)

@@ -159,6 +159,8 @@ contains
       t = self%t_good
       if (self%grid%n > 0) call check(error, FERKStepSetFixedStep(self%memory, self%grid%next_end() - self%t_good), &
                                       'ERKStepSetFixedStep', self%t_good)
+      t_reached = t(1)
+      if (allocated(error)) return
       call check(error, FERKStepEvolve(self%memory, self%t_stop, self%state, t, ARK_ONE_STEP), 'ERKStepEvolve', self%t_good)
       t_reached = t(1)
    end subroutine evolve

@@ -340,8 +340,8 @@ contains
             error(i) = h*neglected_of(self%stages, power(:, i))
          end do
          tolerance = self%quadrature_limit(y)
-         if (maxval(error) > tolerance) call compare_halves(self, t)
-         if (maxval(error) > tolerance .and. self%refines) then
+         if (.not. maxval(error) <= tolerance) call compare_halves(self, t)
+         if (.not. maxval(error) <= tolerance .and. self%refines) then
             call self%refine_quadratures(t, h, y, tolerance, followed)
             self%refines = followed
          end if

@@ -8,7 +8,7 @@ module rodyn_stability_function
    use rodyn_erk_tableau, only: erk_tableau
    implicit none (type, external)
    private
-   public :: stability_function, new_stability_function, stability_function_of
+   public :: stability_function, stability_function_of
 
    type :: stability_function
       real(wp), allocatable :: coefficient(:) !! of z^k (0:stages)

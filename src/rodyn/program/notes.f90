@@ -9,7 +9,7 @@ module rodyn_notes
    use rodyn_text, only: to_text, formatted, time_text
    implicit none (type, external)
    private
-   public :: notes_on, neglected_damping
+   public :: notes_on
 
    integer, parameter :: most_dof = 600                   !! beyond, eigenvalues would cost more than they tell
    real(wp), parameter :: least_neglected = 1.0e-9_wp     !! smaller terms are not worth a word

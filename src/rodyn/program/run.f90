@@ -118,7 +118,8 @@ contains
       if (.not. config%solver%fixed_step > 0.0_wp) return
       call new_run_setup(setup, config, .false., error)
       if (.not. allocated(error)) call check_fixed_step(trim(config%solver%method), config%solver%solver_options, &
-                                                        setup%motion%dynamics%scene, setup%y, config%t_end, error)
+                                                        setup%motion%dynamics%scene, setup%motion%switches, setup%y, &
+                                                        config%t_end, error)
       if (allocated(error)) error%message = name//': '//error%message
    end subroutine check_steps
 

@@ -20,7 +20,7 @@ module rodyn_hinge_law
    use rodyn_three_moments, only: three_moments, new_three_moments
    implicit none (type, external)
    private
-   public :: hinge_law, new_hinge_law, hinge_moments, hinge_state, hinge_rates, hinge_tangent, joint_rotations, openings, &
+   public :: hinge_law, new_hinge_law, hinge_moments, hinge_state, hinge_tangent, joint_rotations, openings, &
       relaxation_rates, relaxation_tangent, initial_joints, spring_energy, damper_power, relaxing_power
 
    !> Springs, dampers and kinks of hinges 0..n-1.

@@ -4,7 +4,7 @@ module rodyn_rod_integrals
    use rodyn_quadrature, only: gauss_rule
    implicit none (type, external)
    private
-   public :: rod_integrals, new_rod_integrals, shape_alpha, shape_beta, shape_bubble, curvature_alpha, curvature_beta
+   public :: rod_integrals, new_rod_integrals, shape_alpha, shape_beta, curvature_alpha, curvature_beta
    public :: bubble_stiffness
 
    !> Integrals over one rod, 0 <= s <= l; m(s) is its mass per length.

@@ -113,7 +113,7 @@ contains
          driver%choice = named_method(trim(solver%method), solver%solver_options)
       end if
       if (.not. allocated(error)) &
-         call check_fixed_step(driver%choice%method, driver%choice%options, motion%dynamics%scene, y, t_end, error)
+         call check_fixed_step(driver%choice%method, driver%choice%options, motion%dynamics%scene, motion%switches, y, t_end, error)
    end subroutine new_driver
 
    !> The choice at the start, for the laws that hinges have once the run has begun.

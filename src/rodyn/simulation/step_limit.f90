@@ -22,10 +22,11 @@ module rodyn_step_limit
 contains
 
    !> Refuse a fixed step that is beyond the limit of its method. Nothing is looked at without one.
-   subroutine check_fixed_step(method, options, scene, y, t_end, error)
+   subroutine check_fixed_step(method, options, scene, switches, y, t_end, error)
       character(len=*), intent(in) :: method
       type(solver_options), intent(in) :: options
       type(scene_type), intent(in) :: scene
+      real(wp), intent(in) :: switches(:) !! of the motion, increasing [s]
       real(wp), contiguous, intent(in) :: y(:) !! state at t = 0
       real(wp), intent(in) :: t_end !! [s]
       type(error_type), allocatable, intent(out) :: error !! exit code 2
@@ -38,7 +39,7 @@ contains
       call stability_function_of(r, method, options%order, error)
       if (allocated(error) .or. .not. allocated(r%coefficient)) return
       call fast_eigenvalues(scene, y, t_end, lambda)
-      step = longest_step(scene, options%fixed_step, t_end)
+      step = longest_step(switches, options%fixed_step, t_end)
       allocate (growth(size(lambda, 2)))
       growth = growth_in_run(r, lambda, step, t_end)
       if (all(growth <= log(most_growth))) return
@@ -51,13 +52,12 @@ contains
    end subroutine check_fixed_step
 
    !> The longest of the steps that are really taken: each interval between switches has a whole number of them.
-   pure real(wp) function longest_step(scene, fixed_step, t_end)
-      type(scene_type), intent(in) :: scene
-      real(wp), intent(in) :: fixed_step, t_end !! [s]
+   pure real(wp) function longest_step(switches, fixed_step, t_end)
+      real(wp), intent(in) :: switches(:), fixed_step, t_end !! [s]
       real(wp), allocatable :: ends(:)
       integer :: i
 
-      ends = [0.0_wp, interval_ends(scene%switches, t_end)]
+      ends = [0.0_wp, interval_ends(switches, t_end)]
       longest_step = 0.0_wp
       do i = 2, size(ends)
          associate (span => ends(i) - ends(i - 1))

@@ -11,7 +11,7 @@ module rodyn_sweep_config
    use rodyn_text, only: formatted, plain_text, quoted, tidy, to_text
    implicit none (type, external)
    private
-   public :: sweep_config, sweep_axis, key_length, axis_size, shown_value, short_value_text, value_text, is_ratio
+   public :: sweep_config, sweep_axis, axis_size, shown_value, short_value_text, value_text, is_ratio
 
    integer, parameter :: key_length = 80
 

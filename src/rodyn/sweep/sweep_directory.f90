@@ -6,7 +6,7 @@
 !>     DIR/status*.txt   how far it is         DIR/sweep.h5   the result
 !>     DIR/sweep.h5.before   the result that --force discards, until the new one is there
 !>
-!> The lock file's bytes are locked: 0 while somebody scans around, 1 by a sweep with all cases, N * 2^20 + I by shard I
+!> The lock file's bytes are locked: 0 while somebody scans the shards, 1 by a sweep with all cases, N * 2^20 + I by shard I
 !> of N, and 2^50 + rank by the other ranks of an MPI job. The system drops the locks of a process when it ends, however
 !> it ends.
 module rodyn_sweep_directory

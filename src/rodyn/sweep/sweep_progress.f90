@@ -8,7 +8,7 @@ module rodyn_sweep_progress
    use rodyn_text, only: to_text, formatted
    implicit none (type, external)
    private
-   public :: sweep_progress, sweep_counts, sweep_line
+   public :: sweep_progress, sweep_counts
 
    !> Cases by what has become of them.
    type :: sweep_counts
