@@ -1,7 +1,7 @@
 !> The article's scene against the numbers of docs/accuracy.md, found by two other codes.
 module test_article
    use rodyn_kinds, only: wp
-   use rodyn_errors, only: error_type, raise
+   use rodyn_errors, only: error_type
    use rodyn_case_config, only: case_config
    use rodyn_case_reader, only: read_case
    use rodyn_scene, only: scene_type, new_scene

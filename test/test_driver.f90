@@ -10,7 +10,7 @@ module test_driver
    use rodyn_driver, only: driver_type, new_driver
    use rodyn_method_costs, only: effort_of
    use rodyn_simulation, only: observer_type, even_times, simulate
-   use test_testing, only: unittest, new_test, check, check_close
+   use test_testing, only: unittest, new_test, check
    implicit none (type, external)
    private
    public :: collect_driver

@@ -4,7 +4,6 @@ module test_locks
    use rodyn_errors, only: error_type
    use rodyn_case_config, only: case_config
    use rodyn_scene, only: scene_type
-   use rodyn_accelerations, only: dynamics_type, new_dynamics
    use rodyn_motion, only: motion_type, state_invariants
    use rodyn_kinematics, only: invariants_type, invariants
    use rodyn_assembled, only: assembled_system, new_assembled_system, mass_matrix

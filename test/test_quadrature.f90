@@ -1,7 +1,7 @@
 !> Gauss rules, rod integrals, sine and cosine.
 module test_quadrature
    use rodyn_kinds, only: wp
-   use rodyn_errors, only: error_type, raise
+   use rodyn_errors, only: error_type
    use rodyn_quadrature, only: gauss_rule, new_gauss_rule
    use rodyn_rod_integrals, only: rod_integrals, new_rod_integrals
    use rodyn_trigonometry, only: sine_cosine

@@ -12,7 +12,7 @@ module test_step_limit
    use rodyn_integrator, only: integrator_type, solver_options
    use rodyn_integrators, only: new_integrator
    use rodyn_stability_function, only: stability_function, stability_function_of
-   use rodyn_step_limit, only: check_fixed_step, growth_in_run, largest_stable_step
+   use rodyn_step_limit, only: check_fixed_step, largest_stable_step
    use test_motions, only: idle_load
    use test_oscillators, only: oscillator, new_oscillator
    use test_random_scenes, only: random_case, seed_random, n_kinds, kind_name

@@ -4,7 +4,7 @@ module test_sweep
    use rodyn_case_config, only: case_config
    use rodyn_checksum, only: crc64, crc64_text, hexadecimal
    use rodyn_errors, only: error_type
-   use rodyn_sweep_case, only: allocate_result, build_case, case_result, case_shape, new_case_shape, status_done
+   use rodyn_sweep_case, only: allocate_result, build_case, case_result, case_shape, status_done
    use rodyn_sweep_config, only: sweep_config
    use rodyn_sweep_plan, only: new_plan, sweep_plan
    use rodyn_input_texts, only: input_texts, new_input_texts

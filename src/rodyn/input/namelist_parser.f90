@@ -8,7 +8,7 @@ module rodyn_namelist_parser
       add_value, is_integer, is_long_integer, is_real, is_string, shown_value, index_text
    use rodyn_namelist_characters, only: make_plain, not_a_text
    use rodyn_namelist_value_text, only: classify
-   use rodyn_text, only: formatted, is_digit, is_name, lower, printable, tidy, to_text
+   use rodyn_text, only: formatted, is_name, lower, printable, tidy, to_text
    use rodyn_utf8, only: first_bad_byte
    implicit none (type, external)
    private

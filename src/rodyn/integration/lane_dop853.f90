@@ -18,7 +18,7 @@
 !>     end do
 module rodyn_lane_dop853
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-   use rodyn_kinds, only: wp, i8
+   use rodyn_kinds, only: wp
    use rodyn_lanes, only: lanes
    use rodyn_aligned_store, only: aligned_store
    use rodyn_lane_ode, only: lane_system

@@ -1,8 +1,8 @@
 !> What CVODE and ARKODE have in common: the handles of the library, single steps towards the stop time, states and events inside
 !> the last step, counts that outlive the library's own, which each restart resets.
 module rodyn_sundials_integrator
-   use, intrinsic :: iso_c_binding, only: c_ptr, c_int, c_long, c_null_ptr, c_associated
-   use rodyn_kinds, only: wp, i8
+   use, intrinsic :: iso_c_binding, only: c_ptr, c_int, c_null_ptr, c_associated
+   use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type, raise
    use rodyn_text, only: time_text
    use rodyn_ode, only: ode_system, n_quadratures

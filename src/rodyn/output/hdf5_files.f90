@@ -7,13 +7,13 @@
 !> is kept: whatever is to be written after it is not, and `tell`, `flush` and `close` tell of it.
 module rodyn_hdf5_files
    use, intrinsic :: iso_c_binding, only: c_associated, c_bool, c_char, c_f_pointer, c_funloc, c_funptr, c_int, c_int64_t, c_loc, &
-      c_null_char, c_ptr, c_size_t
+      c_ptr, c_size_t
    use, intrinsic :: iso_fortran_env, only: int32, int64
    use hdf5, only: hid_t, hsize_t, size_t, h5dont_atexit_f, h5open_f, h5get_libversion_f, h5eset_auto_f, &
       h5fcreate_f, h5fopen_f, h5fclose_f, h5fflush_f, h5f_acc_excl_f, h5f_acc_rdonly_f, h5f_close_strong_f, &
       h5f_libver_v18_f, h5f_scope_local_f, &
       h5pcreate_f, h5pclose_f, h5p_file_access_f, h5p_file_create_f, h5p_group_create_f, h5p_dataset_create_f, &
-      h5p_default_f, h5pset_fclose_degree_f, h5pset_libver_bounds_f, h5pset_obj_track_times_f, h5pset_chunk_f, &
+      h5pset_fclose_degree_f, h5pset_libver_bounds_f, h5pset_obj_track_times_f, h5pset_chunk_f, &
       h5pset_shuffle_f, h5pset_deflate_f, h5pset_fletcher32_f, &
       h5gcreate_f, h5gclose_f, h5gget_info_by_name_f, h5lexists_f, h5lget_name_by_idx_f, h5_index_name_f, h5_iter_inc_f, &
       h5screate_f, h5screate_simple_f, h5sclose_f, h5s_scalar_f, h5s_unlimited_f, h5s_select_set_f, &

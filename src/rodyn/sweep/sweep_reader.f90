@@ -14,7 +14,7 @@ module rodyn_sweep_reader
    use rodyn_field_loader, only: field_loader
    use rodyn_file_text, only: read_text_file
    use rodyn_input_texts, only: input_texts
-   use rodyn_namelist_document, only: namelist_document, group_count
+   use rodyn_namelist_document, only: group_count
    use rodyn_namelist_edit, only: split_key
    use rodyn_namelist_parser, only: parse_document
    use rodyn_schema, only: schema_group, schema_row, any_list, group_index, matching_word, nearest_key, nearest_group, positive, &
