@@ -2,7 +2,7 @@
 module rodyn_defaults_writer
    use rodyn_kinds, only: wp
    use rodyn_field_visitor, only: field_visitor
-   use rodyn_schema, only: schema_extent, schema_group, schema_row, name_length, any_list, rule_text
+   use rodyn_schema, only: schema_extent, schema_group, schema_row, name_length, any_list, rule_text, type_real
    use rodyn_text, only: plain_text, quoted, to_text
    use rodyn_text_buffer, only: text_buffer
    implicit none (type, external)
@@ -20,12 +20,10 @@ module rodyn_defaults_writer
       procedure :: open_group
       procedure :: close_group
       procedure :: real_field
-      procedure :: array_field
+      procedure :: any_field
       procedure :: integer_field
       procedure :: logical_field
       procedure :: word_field
-      procedure :: text_field
-      procedure :: texts_field
    end type defaults_writer
 
 contains
@@ -65,14 +63,6 @@ contains
       end if
    end subroutine real_field
 
-   subroutine array_field(self, x, row)
-      class(defaults_writer), intent(inout) :: self
-      real(wp), allocatable, intent(inout) :: x(:)
-      type(schema_row), intent(in) :: row
-      associate (unused => x); end associate
-      call put(self, row, '0.0')
-   end subroutine array_field
-
    subroutine integer_field(self, x, row)
       class(defaults_writer), intent(inout) :: self
       integer, intent(inout) :: x
@@ -94,21 +84,17 @@ contains
       call put(self, row, quoted(trim(x)))
    end subroutine word_field
 
-   subroutine text_field(self, x, row)
+   !> Lists and texts: an array of numbers has zeros, a text is empty.
+   subroutine any_field(self, row, type)
       class(defaults_writer), intent(inout) :: self
-      character(len=:), allocatable, intent(inout) :: x
       type(schema_row), intent(in) :: row
-      associate (unused => x); end associate
-      call put(self, row, "''")
-   end subroutine text_field
-
-   subroutine texts_field(self, x, row)
-      class(defaults_writer), intent(inout) :: self
-      character(len=:), allocatable, intent(inout) :: x(:)
-      type(schema_row), intent(in) :: row
-      associate (unused => x); end associate
-      call put(self, row, '')
-   end subroutine texts_field
+      integer, intent(in) :: type
+      if (type == type_real) then
+         call put(self, row, '0.0')
+      else
+         call put(self, row, "''")
+      end if
+   end subroutine any_field
 
    !> A number by few digits, with a decimal point: '1.0e-8'.
    pure function decimal(x) result(text)
