@@ -17,6 +17,7 @@ from cycler import cycler
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 COLOURS = ["#000000", "#0072B2", "#D55E00", "#009E73", "#E69F00", "#56B4E9", "#CC79A7"]
@@ -149,12 +150,28 @@ def time_axis(axes: Axes) -> None:
     axes.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
 
 
+def wrap_title(axes: Axes) -> None:
+    """Have a title that would meet the next axes, or the edge of the figure, broken at the width of its own. Call it when the
+    figure has been drawn."""
+    words = axes.get_title(loc="left")
+    if not words:
+        return
+    figure = axes.figure
+    title = next(text for text in axes.findobj(Text) if text.get_text() == words)
+    right = min((other.bbox.x0 for other in figure.axes if other.bbox.x0 > axes.bbox.x1), default=figure.bbox.x1)
+    if title.get_window_extent().x1 > right:
+        inches = axes.bbox.width / figure.dpi
+        title.set_wrap(True)
+        title._get_wrap_line_width = lambda: inches * figure.dpi  # matplotlib itself wraps at the edges of the figure only
+
+
 def settle(figure: Figure) -> None:
     """Find the layout once for all formats. Axes of equal scale move when they are drawn, hence the second pass."""
     figure.draw_without_rendering()
     for axes in figure.axes:
         for axis in (axes.xaxis, axes.yaxis):
             factor_into_label(axis)
+        wrap_title(axes)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
 

@@ -18,6 +18,7 @@ import shape
 import spectrum
 import style
 from geometry import chain, largest_deflection
+from matplotlib.text import Text
 from PIL import Image
 from rodyn_data import DataError, open_run, unit_text
 
@@ -175,6 +176,18 @@ def test_phase_portraits_pair_a_quantity_with_its_rate(runs, tmp_path):
         assert np.array_equal(line_data(figure.axes[1])[0], np.stack([file["rotation"][()], file["omega"][()]], axis=1))
     with pytest.raises(DataError, match="'omega' has no rate"):
         phase.plot(runs["n4"], tmp_path / "x.png", ["omega"])
+
+
+@pytest.mark.parametrize("script", [histories, phase])
+def test_titles_keep_to_their_own_side(runs, tmp_path, script):
+    quantities = ["phi(1)", "phi(4)"]
+    figure = script.plot(runs["n4"], tmp_path / "p.png", quantities)
+    figure.draw_without_rendering()
+    titles = [text for axes in figure.axes for text in axes.findobj(Text) if text.get_text() and text.get_text() == axes.get_title(loc="left")]
+    boxes = [title.get_window_extent() for title in titles]
+    assert len(boxes) == len(figure.axes)
+    assert all(box.x1 <= figure.bbox.x1 for box in boxes)
+    assert not any(one.overlaps(other) for i, one in enumerate(boxes) for other in boxes[:i])
 
 
 def test_the_ledger_shows_the_size_of_the_residual(runs, tmp_path):
