@@ -7,6 +7,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+from rodyn_data import Sweep
+
 
 class Printed(NamedTuple):
     """One quantity at one time; `reference` comes from two independent integrators of high order."""
@@ -47,7 +50,7 @@ def range_text(row: Printed | None) -> str:
 
 TABLE_3_TIME = 1.0
 TABLE_3_AXIS = "mass_ratio"
-# Degrees for the angles of the rods, m, rad.
+# Degrees for the angles of the rods, m, rad. What is printed for u_x is `slipped_displacement`.
 TABLE_3_QUANTITIES = [("phi(1)", "deg"), ("phi(4)", "deg"), ("displacement_x", "m"), ("rotation", "rad")]
 # Ratio: exact, lumped.
 TABLE_3 = {
@@ -57,3 +60,18 @@ TABLE_3 = {
     16: (("-44.534", "-180.568", "0.354", "2.849"), ("-44.189", "-180.659", "0.355", "2.844")),
     32: (("-39.314", "-177.633", "0.627", "1.894"), ("-38.930", "-177.281", "0.629", "1.887")),
 }
+
+
+def slipped_displacement(sweep: Sweep) -> np.ndarray:
+    """What table 3 prints for u_x [m]: the solution of u' = V_x - w u, where u_x' = V_x + w u_y; it acts on nothing else.
+
+    With theta' = w it is u = int V_x exp(theta(s) - theta(t)) ds, here by Simpson's rule over the series up to the end of each case,
+    which have equal intervals, an even number of them. NaN in a sweep without series.
+    """
+    names = [f"series_{name}" for name in ("time", "velocity_x", "rotation")]
+    if not all(name in sweep.file for name in names):
+        return np.full(sweep.n_cases, np.nan)
+    t, v, theta = (sweep.file[name][()] for name in names)
+    weights = np.full(t.shape[1], 2.0)
+    weights[1::2], weights[[0, -1]] = 4.0, 1.0
+    return (t[:, 1] - t[:, 0]) / 3.0 * (weights * v * np.exp(theta - theta[:, -1:])).sum(axis=1)

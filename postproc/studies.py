@@ -8,11 +8,10 @@ import argparse
 import sys
 
 import numpy as np
-from article import TABLE_3, TABLE_3_AXIS, TABLE_3_QUANTITIES, TABLE_3_TIME, printed, range_text
+from article import TABLE_3, TABLE_3_AXIS, TABLE_3_QUANTITIES, TABLE_3_TIME, printed, range_text, slipped_displacement
 from rodyn_data import DataError, Sweep, distinct, open_sweep
 
-HINGES = np.array([7000.0, 5000.0, 5000.0, 5000.0])  # N m/rad, table 3
-N_RODS = HINGES.size
+N_RODS = 4
 
 
 def print_times(sweep: Sweep, times: list[int]) -> None:
@@ -47,31 +46,24 @@ def per_rod(sweep: Sweep, name: str, t: float) -> np.ndarray:
     return np.stack([sweep.quantity(f"{name}({k})", t).values for k in range(1, N_RODS + 1)], axis=1)
 
 
-def hinge_energies(sweep: Sweep, t: float) -> np.ndarray:
-    """Energy that the hinges of each case hold, J."""
-    phi, alpha, beta = (per_rod(sweep, name, t) for name in ("phi", "alpha", "beta"))
-    none = np.zeros((len(phi), 1))
-    angle = np.diff(phi, axis=1, prepend=none) + alpha - np.hstack([none, beta[:, :-1]])
-    return 0.5 * (HINGES * angle**2).sum(axis=1)
-
-
 def table_3(sweep: Sweep) -> None:
-    """phi_1, phi_4, u_x, theta at t = 1 s, ours and the article's, and the energy that the hinges hold."""
+    """phi_1, phi_4, u_x as the article has it and theta at t = 1 s, ours beside the printed numbers; the true u_x."""
     ratios, exact, lumped = pairs(sweep)
-    columns = [sweep.quantity(name, TABLE_3_TIME).values for name, _ in TABLE_3_QUANTITIES]
-    energy = hinge_energies(sweep, TABLE_3_TIME)
-    print(" ratio   phi_1, deg      phi_4, deg        u_x, m          theta, rad      hinges, J   | the article's; hinges, J")
+    columns = {name: sweep.quantity(name, TABLE_3_TIME).values for name, _ in TABLE_3_QUANTITIES}
+    true = columns["displacement_x"]
+    columns["displacement_x"] = slipped_displacement(sweep)
+    scales = {"deg": 180.0 / np.pi}
+    heads = ["phi_1, deg", "phi_4, deg", "u of u' = Vx - w u", "theta, rad"]
+    print(" ratio       " + "".join(f"{head:>20}" for head in heads) + "     u_x, m   (ours and the article's; ours)")
+    equal = dict.fromkeys(("exact", "lumped"), 0)
     for row, ratio in enumerate(ratios):
-        for kind, cases in enumerate((exact, lumped)):
-            i = cases[row]
-            phi_1, phi_4, u_x, theta = (column[i] for column in columns)
-            theirs = [float(text) for text in TABLE_3[int(ratio)][kind]]
-            # only phi_1 and phi_4 are printed: at least C_0 phi_1^2 / 2, and the rest shared by three equal hinges
-            bend = np.radians(theirs[1] - theirs[0])
-            least = 0.5 * HINGES[0] * np.radians(theirs[0]) ** 2 + 0.5 * HINGES[1] * bend**2 / 3
-            print(f"{ratio:6g} {'exact ' if kind == 0 else 'lumped'}{np.degrees(phi_1):10.3f}{np.degrees(phi_4):15.3f}"
-                  f"{u_x:14.4f}{theta:17.4f}{energy[i]:13.0f}     | "
-                  + "".join(f"{value:10.3f}" for value in theirs) + f"{least:9.0f}")
+        for kind, (word, cases) in enumerate((("exact", exact), ("lumped", lumped))):
+            ours = [f"{columns[name][cases[row]] * scales.get(unit, 1.0):.3f}" for name, unit in TABLE_3_QUANTITIES]
+            theirs = TABLE_3[int(ratio)][kind]
+            equal[word] += sum(a == b for a, b in zip(ours, theirs, strict=True))
+            print(f"{ratio:6g} {word:6}" + "".join(f"{a:>11}{b:>9}" for a, b in zip(ours, theirs, strict=True))
+                  + f"{true[cases[row]]:11.5f}")
+    print(", ".join(f"{word}: {number} of {4 * len(ratios)} numbers are the printed ones" for word, number in equal.items()))
 
 
 def differences(sweep: Sweep) -> tuple[np.ndarray, np.ndarray]:

@@ -17,11 +17,13 @@ from typing import NamedTuple
 
 import command
 import numpy as np
-from article import TABLE_1, TABLE_2, TABLE_3, TABLE_3_AXIS, TABLE_3_QUANTITIES, TABLE_3_TIME, Printed
-from exact_lumped import Pair, pair_up
+from article import TABLE_1, TABLE_2, TABLE_3, TABLE_3_AXIS, TABLE_3_QUANTITIES, TABLE_3_TIME, Printed, slipped_displacement
+from exact_lumped import INERTIA, KINDS
 from rodyn_data import DataError, Run, Sweep, is_sweep, open_run, open_sweep, split_name, symbol_text
 
 MISSING = "–"
+TABLE_3_NOTE = (r"The article's $EI$ is a misprint, its $u_x$ solves $\dot{u} = V_x - \omega u$ and stands under that, and its lumped rows have the "
+                "inner half of rod 1 in the spacecraft without a lever: docs/studies.md.")
 
 
 class Table(NamedTuple):
@@ -30,6 +32,7 @@ class Table(NamedTuple):
     title: str
     head: list[str]
     rows: list[list[str]]
+    note: str = ""
 
 
 class Written(NamedTuple):
@@ -115,33 +118,38 @@ def farthest(values: Sequence[float], reference: float) -> float | None:
 
 
 def table_3(sweep: Sweep) -> Table:
-    """Exact, lumped and their difference for each ratio; printed numbers below ours."""
+    """Exact, lumped and their difference for each ratio; printed numbers below ours, their u_x under the equation that it follows."""
+    quantities = [sweep.quantity(name, TABLE_3_TIME) for name, _ in TABLE_3_QUANTITIES]
+    factors = [180.0 / np.pi if unit == "deg" else 1.0 for _, unit in TABLE_3_QUANTITIES]
     head = [TABLE_3_AXIS.replace("_", " "), "source", "inertia"]
-    pairs: list[tuple[Pair, float]] = []
-    for name, unit in TABLE_3_QUANTITIES:
-        pair = pair_up(sweep, name, TABLE_3_AXIS, {}, TABLE_3_TIME)[1]
-        pairs.append((pair, 180.0 / np.pi if unit == "deg" else 1.0))
-        head.append(f"{pair.exact.symbol}, {'°' if unit == 'deg' else unit}")
-    ratios = sorted({float(x) for x in pairs[0][0].x} | {float(r) for r in TABLE_3})
+    head += [f"{q.symbol}, {'°' if unit == 'deg' else unit}" for q, (_, unit) in zip(quantities, TABLE_3_QUANTITIES, strict=True)]
+    head.append(r"$u$ of $\dot{u} = V_x - \omega u$, m")
+    columns = [q.values * factor for q, factor in zip(quantities, factors, strict=True)] + [slipped_displacement(sweep)]
+    ratios, inertia = sweep.axis(TABLE_3_AXIS).astype(float), sweep.axis(INERTIA)
     rows = []
-    for ratio in ratios:
-        where = np.flatnonzero(np.isclose(pairs[0][0].x, ratio))
-        if where.size:
-            exact = [pair.exact.values[where[0]] * factor for pair, factor in pairs]
-            lumped = [pair.lumped.values[where[0]] * factor for pair, factor in pairs]
-            rows += block(f"{ratio:g}", "Rodyn", exact, lumped)
+    for ratio in sorted({*ratios, *map(float, TABLE_3)}):
+        cases = [np.flatnonzero(np.isclose(ratios, ratio) & (inertia == kind)) for kind in KINDS]
+        if all(found.size for found in cases):
+            rows += block(f"{ratio:g}", "Rodyn", *([column[found[0]] for column in columns] for found in cases))
         if ratio in TABLE_3:
-            rows += block(f"{ratio:g}", "article", *([float(cell) for cell in line] for line in TABLE_3[int(ratio)]))
-    return Table(f"Table 3. Exact and lumped inertia at t = {TABLE_3_TIME:g} s", head, rows)
+            rows += block(f"{ratio:g}", "article", *(under_its_equation(line) for line in TABLE_3[int(ratio)]))
+    return Table(f"Table 3. Exact and lumped inertia at t = {TABLE_3_TIME:g} s", head, rows, TABLE_3_NOTE)
+
+
+def under_its_equation(line: Sequence[str]) -> list[float]:
+    """A printed row with its u_x in the last column."""
+    *angles, displacement, rotation = map(float, line)
+    return [*angles, np.nan, rotation, displacement]
 
 
 def block(ratio: str, source: str, exact: Sequence[float], lumped: Sequence[float]) -> list[list[str]]:
     lines = [("exact", exact), ("lumped", lumped), ("difference", [a - b for a, b in zip(exact, lumped, strict=True)])]
-    return [[ratio, source, name, *(fixed(v, 3) for v in values)] for name, values in lines]
+    return [[ratio, source, name, *(fixed(v, 3, MISSING if np.isfinite(values).any() else "failed") for v in values)]
+            for name, values in lines]
 
 
-def fixed(value: float, digits: int) -> str:
-    return minus(f"{value:.{digits}f}") if np.isfinite(value) else "failed"
+def fixed(value: float, digits: int, missing: str = "failed") -> str:
+    return minus(f"{value:.{digits}f}") if np.isfinite(value) else missing
 
 
 def minus(text: str) -> str:
@@ -168,7 +176,8 @@ def scientific(value: float) -> str:
 
 def markdown(table: Table) -> str:
     lines = [f"**{table.title}**", "", "| " + " | ".join(table.head) + " |", "|---|" + "---:|" * (len(table.head) - 1)]
-    return "\n".join(lines + ["| " + " | ".join(cell if "$" in cell else minus(cell) for cell in row) + " |" for row in table.rows])
+    lines += ["| " + " | ".join(cell if "$" in cell else minus(cell) for cell in row) + " |" for row in table.rows]
+    return "\n".join(lines + ["", table.note] if table.note else lines)
 
 
 def latex(table: Table) -> str:
@@ -178,7 +187,8 @@ def latex(table: Table) -> str:
         f"\\begin{{tabular}}{{l{'r' * (len(table.head) - 1)}}}", "\\toprule", " & ".join(map(tex, table.head)) + " \\\\", "\\midrule",
     ]
     lines += [" & ".join(map(tex, row)) + " \\\\" for row in table.rows]
-    return "\n".join([*lines, "\\bottomrule", "\\end{tabular}", "\\end{table}"])
+    note = ["", f"\\medskip\\small {tex(table.note)}"] if table.note else []
+    return "\n".join([*lines, "\\bottomrule", "\\end{tabular}", *note, "\\end{table}"])
 
 
 def tex(cell: str) -> str:
