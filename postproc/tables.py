@@ -22,8 +22,8 @@ from exact_lumped import INERTIA, KINDS
 from rodyn_data import DataError, Run, Sweep, is_sweep, open_run, open_sweep, split_name, symbol_text
 
 MISSING = "–"
-TABLE_3_NOTE = (r"The article's $EI$ is a misprint, its $u_x$ solves $\dot{u} = V_x - \omega u$ and stands under that, and its lumped rows have the "
-                "inner half of rod 1 in the spacecraft without a lever: docs/studies.md.")
+TABLE_3_NOTE = (r"The article's $EI$ is a misprint, its $u_x$ solves $\dot{u} = V_x - \omega u$ and stands under that, and its lumped rows "
+                "have the inner half of rod 1 in the spacecraft without a lever: docs/studies.md.")
 
 
 class Table(NamedTuple):
@@ -177,7 +177,7 @@ def scientific(value: float) -> str:
 def markdown(table: Table) -> str:
     lines = [f"**{table.title}**", "", "| " + " | ".join(table.head) + " |", "|---|" + "---:|" * (len(table.head) - 1)]
     lines += ["| " + " | ".join(cell if "$" in cell else minus(cell) for cell in row) + " |" for row in table.rows]
-    return "\n".join(lines + ["", table.note] if table.note else lines)
+    return "\n".join([*lines, "", table.note] if table.note else lines)
 
 
 def latex(table: Table) -> str:
