@@ -243,9 +243,9 @@ contains
       character(len=*), intent(in) :: name
       type(error_type), allocatable, intent(out) :: error
       type(invariants_type) :: values
-      real(wp) :: found(size(theta))
+      real(wp), dimension(size(theta)) :: found, rate
 
-      call motion%dynamics%hinge_rotations(y(:motion%n_q), y(motion%n_q + 1:), found)
+      call motion%dynamics%hinge_rotations(y(:motion%n_q), y(motion%n_q + 1:), found, rate)
       call check_close(error, found, theta, close_enough, name//': joints')
       values = state_invariants(motion, y)
       if (.not. allocated(error)) call check_close(error, values%elastic, energy, close_enough*(1.0_wp + energy), name//': energy')

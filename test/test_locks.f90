@@ -62,14 +62,14 @@ contains
       real(wp), intent(inout) :: y(:)
       logical, intent(in) :: locked(0:)
       type(error_type), allocatable, intent(out) :: error
-      real(wp), dimension(0:size(locked) - 1) :: still, opening, theta, impulse
+      real(wp), dimension(0:size(locked) - 1) :: still, opening, theta, theta_rate, impulse
       real(wp) :: lost
       logical :: ok
 
       still = 0.0_wp
       associate (scene => motion%dynamics%scene, r => motion%n_q, m => motion%n_dof, first => motion%dynamics%scene%n_base)
          call openings(scene%n, scene%dynamic_bending, y(first + 1:), opening)
-         call motion%dynamics%hinge_rotations(y(:r), y(r + 1:r + m), theta)
+         call motion%dynamics%hinge_rotations(y(:r), y(r + 1:r + m), theta, theta_rate)
          call motion%dynamics%velocity_jump(y(:r), (y(r + 1:r + m)), locked, still, y(r + 1:r + m), lost, impulse, ok)
          call motion%dynamics%set_locked(locked, still, theta, error)
          call motion%dynamics%project_locked(opening, still, y(:r), y(r + 1:r + m))
@@ -532,7 +532,7 @@ contains
       type(case_config) :: config
       type(motion_type) :: motion
       type(invariants_type) :: before, after
-      real(wp), allocatable :: y(:), a(:), b(:), theta(:)
+      real(wp), allocatable :: y(:), a(:), b(:), theta(:), theta_rate(:)
       real(wp) :: still(0:4)
       logical :: ok
       integer :: i, which
@@ -547,17 +547,17 @@ contains
          call motion_of(motion, y, config, error)
          if (allocated(error)) return
          associate (r => motion%n_q, m => motion%n_dof)
-            allocate (a(m), b(m), theta(0:4))
+            allocate (a(m), b(m), theta(0:4), theta_rate(0:4))
             call motion%dynamics%accelerations(0.3_wp, y(:r), y(r + 1:r + m), a, ok)
             before = state_invariants(motion, y)
-            call motion%dynamics%hinge_rotations(y(:r), y(r + 1:r + m), theta)
+            call motion%dynamics%hinge_rotations(y(:r), y(r + 1:r + m), theta, theta_rate)
             call motion%dynamics%set_locked([.true., .false., .true., .true., .false.], still, theta)
             call motion%dynamics%accelerations(0.3_wp, y(:r), y(r + 1:r + m), b, ok)
             after = state_invariants(motion, y)
             call check_close(error, b, a, 1.0e-11_wp*maxval(abs(a)), kind_name(which)//': accelerations')
             call check_close(error, after%elastic, before%elastic, 1.0e-12_wp*before%elastic, kind_name(which)//': energy')
             if (allocated(error)) return
-            deallocate (a, b, theta)
+            deallocate (a, b, theta, theta_rate)
          end associate
       end do
    end subroutine test_quasistatic_latch

@@ -247,12 +247,13 @@ contains
       call expand(self%scene, self%hinges%locked, opening_rate, p)
    end subroutine project_locked
 
-   !> Joint rotations th of all hinges: where `set_locked` may hold them.
-   pure subroutine hinge_rotations(self, q, p, theta)
+   !> Joint rotations th of all hinges, where `set_locked` may hold them, and their rates.
+   pure subroutine hinge_rotations(self, q, p, theta, theta_rate)
       class(dynamics_type), intent(in) :: self
       real(wp), intent(in) :: q(:), p(:)
-      real(wp), intent(out) :: theta(0:) !! (0:n-1) [rad]
-      real(wp) :: theta_rate(0:self%scene%n - 1), moment(0:self%scene%n), moment_rate(0:self%scene%n)
+      real(wp), intent(out) :: theta(0:)      !! th (0:n-1) [rad]
+      real(wp), intent(out) :: theta_rate(0:) !! th' (0:n-1) [rad/s]
+      real(wp), dimension(0:self%scene%n) :: moment, moment_rate
 
       associate (scene => self%scene, first => self%scene%n_base + 1)
          call hinge_state(self%hinges, scene%n, scene%dynamic_bending, q(first:), p(first:), theta, theta_rate, moment, &

@@ -5,7 +5,6 @@
 module rodyn_quantities
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: case_config
-   use rodyn_hinge_law, only: joint_rotations
    use rodyn_kinematics, only: invariants_type, invariants, slopes
    use rodyn_motion, only: motion_type
    implicit none (type, external)
@@ -250,8 +249,7 @@ contains
             call put(row, 'angular_momentum', [now%angular_momentum])
          end if
          if (row%layout%has(loads)) then
-            call joint_rotations(motion%dynamics%hinges, n, scene%dynamic_bending, q(scene%n_base + 1:), p(scene%n_base + 1:), &
-                                 x(:, 1), x(:, 2))
+            call motion%dynamics%hinge_rotations(q, p, x(:, 1), x(:, 2))
             call put(row, 'hinge_angle', x(:, 1))
             call put(row, 'hinge_rate', x(:, 2))
          end if

@@ -20,7 +20,7 @@ module rodyn_hinge_law
    use rodyn_three_moments, only: three_moments, new_three_moments
    implicit none (type, external)
    private
-   public :: hinge_law, new_hinge_law, hinge_moments, hinge_state, hinge_tangent, joint_rotations, openings, &
+   public :: hinge_law, new_hinge_law, hinge_moments, hinge_state, hinge_tangent, openings, &
       relaxation_rates, relaxation_tangent, initial_joints, spring_energy, damper_power, relaxing_power
 
    !> Springs, dampers and kinks of hinges 0..n-1.
@@ -491,8 +491,8 @@ contains
       theta = all_joints(law%relaxing)
    end subroutine initial_joints
 
-   !> Joint rotations th, their rates, and the moments that bend the rods, for output and ledger. Rates of
-   !> undamped hinges beside relaxing ones are not needed and zero. In the `reduced` treatment rods feel the springs only.
+   !> Joint rotations th, their rates, and the moments that bend the rods, for events, output and ledger. In the `reduced`
+   !> treatment rods feel the springs only.
    pure subroutine hinge_state(law, n, flexible, angle, angle_rate, theta, theta_rate, moment, moment_rate)
       type(hinge_law), intent(in) :: law
       integer, intent(in) :: n
@@ -528,26 +528,6 @@ contains
       call clear_at(law%held, theta_rate)
    end subroutine hinge_state
 
-   !> Joint rotations th and all their rates, for output.
-   pure subroutine joint_rotations(law, n, flexible, angle, angle_rate, theta, theta_rate)
-      type(hinge_law), intent(in) :: law
-      integer, intent(in) :: n
-      logical, intent(in) :: flexible
-      real(wp), intent(in) :: angle(*), angle_rate(*)
-      real(wp), intent(out) :: theta(0:n - 1)      !! th [rad]
-      real(wp), intent(out) :: theta_rate(0:n - 1) !! th' [rad/s]
-      real(wp) :: moment(0:n), moment_rate(0:n), rate(size(law%relaxing))
-
-      call hinge_state(law, n, flexible, angle, angle_rate, theta, theta_rate, moment, moment_rate)
-      if (size(law%relaxing) == 0) return
-      rate = theta_rate(law%relaxing)
-      call openings(n, flexible, angle_rate, theta_rate)
-      theta_rate = theta_rate - law%kink_rate
-      call moments_of_series(law, n, theta_rate, rate, moment)
-      theta_rate(law%relaxing) = rate
-      call clear_at(law%held, theta_rate)
-   end subroutine joint_rotations
-
    !> The same with relaxing hinges; on entry theta and theta_rate hold the openings from their kinks (and what constant
    !> moments bend), and their rates.
    pure subroutine relaxing_state(law, n, given, theta, theta_rate, moment, moment_rate)
@@ -565,8 +545,8 @@ contains
       call moments_of_series(law, n, theta_rate, rate, moment_rate)
       theta(law%held) = law%held_at
       theta(law%relaxing) = given
-      theta_rate = 0.0_wp
       theta_rate(law%relaxing) = rate
+      call clear_at(law%held, theta_rate)
    end subroutine relaxing_state
 
    !> Rates th' of the joint rotations alone, where no hinge is relaxing.
