@@ -187,8 +187,8 @@ contains
       end associate
       do i = 1, size(dynamics%hinges%mechanisms)
          associate (mechanism => dynamics%hinges%mechanisms(i), k => dynamics%hinges%mechanisms(i)%hinge)
-            mechanism%held = mechanism%held .and. mechanism%release_time > 0.0_wp
-            if (mechanism%held) call mechanism%lock(at(k))
+            mechanism%is_held = mechanism%held .and. mechanism%release_time > 0.0_wp
+            if (mechanism%is_held) call mechanism%lock(at(k))
             if (mechanism%is_constrained() .and. abs(turning(k)) > 1.0e-9_wp) then
                call raise(error, 'hinge '//to_text(k)//' is held but has an initial rate')
                return
@@ -382,14 +382,14 @@ contains
       real(wp) :: before, lost_here, lost_in_all, in_jump
       integer :: i, last
 
-      released = any(due .and. dynamics%hinges%mechanisms%held) .and. .not. allocated(error)
+      released = any(due .and. dynamics%hinges%mechanisms%is_held) .and. .not. allocated(error)
       if (.not. released) return
       call find_joints(self, dynamics, t, q, p)
       before = elastic_energy(dynamics%scene, dynamics%hinges, q, p)
       lost_in_all = 0.0_wp
       do i = 1, size(due)
          associate (mechanism => dynamics%hinges%mechanisms(i))
-            if (.not. (due(i) .and. mechanism%held)) cycle
+            if (.not. (due(i) .and. mechanism%is_held)) cycle
             call mechanism%release(self%theta(mechanism%hinge), lost_here)
             lost_in_all = lost_in_all + lost_here
             call self%note(t, mechanism%hinge, kind_released, lost_here, error)
@@ -441,7 +441,7 @@ contains
          if (i == 0) exit
          associate (mechanism => dynamics%hinges%mechanisms(i))
             if (dynamics%scene%quasistatic .and. .not. mechanism%lock_stiffness > 0.0_wp) &
-               call mechanism%choose_laws(mechanism%latch, 0.0_wp) ! its springs stay as they are there
+               call mechanism%choose_laws(mechanism%latch_angle, 0.0_wp) ! its springs stay as they are there
          end associate
          call latch(self, dynamics, i, t, q, p, lost, error)
       end do
@@ -472,7 +472,7 @@ contains
          if (.not. margin_of(self, dynamics, i, t) < 0.0_wp) cycle
          associate (mechanism => dynamics%hinges%mechanisms(self%mechanism(i)))
             if (mechanism%at_latch) cycle
-            way = (mechanism%latch - before(mechanism%hinge))/(self%theta(mechanism%hinge) - before(mechanism%hinge))
+            way = (mechanism%latch_angle - before(mechanism%hinge))/(self%theta(mechanism%hinge) - before(mechanism%hinge))
             if (first > 0 .and. .not. way < shortest) cycle
             first = self%mechanism(i)
             shortest = way

@@ -3,7 +3,7 @@
 !> Between events every such hinge is linear again,
 !>     T = C th + D th' + t0 + f,
 !> with f the moment of sliding friction. Its parts, for the joint rotation th:
-!> - spring with rest angle a and freeplay g: Ci (th - a) for |th - a| < g, +-Ci g + C (th - a -+ g) beyond;
+!> - spring with rest angle and freeplay, and damper (`rodyn_hinge_spring`);
 !> - stops: Cs d + Ds d' with d the depth in the stop. They push but never pull: the stop is left when that moment vanishes (when
 !>   d does, where dampers bend no rods: `reduced` dampers of quasistatic bending). Its face then follows by itself,
 !>   d_face = d0 exp(-Cs (t - t0)/Ds), and may be met again;
@@ -17,6 +17,7 @@
 module rodyn_hinge_mechanism
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: chain_config, hinge_config, none_given
+   use rodyn_hinge_spring, only: hinge_spring, add_spring
    implicit none (type, external)
    private
    public :: hinge_mechanism, new_mechanism
@@ -34,31 +35,14 @@ module rodyn_hinge_mechanism
 
    real(wp), parameter :: hysteresis = 1.0e-12_wp !! [rad], [rad/s]
 
-   !> One hinge: what it is, and (from `side` on) the law it has now.
-   type :: hinge_mechanism
-      integer :: hinge = 0
-      real(wp) :: stiffness = 0.0_wp        !! C [N m/rad]
-      real(wp) :: damping = 0.0_wp          !! D [N m s/rad]
-      real(wp) :: rest = 0.0_wp             !! a [rad]
-      real(wp) :: freeplay = 0.0_wp         !! g [rad]
-      real(wp) :: inner_stiffness = 0.0_wp  !! Ci [N m/rad]
-      real(wp) :: stop(2) = [-none_given, none_given] !! lower and upper [rad]
-      real(wp) :: stop_stiffness = 0.0_wp   !! Cs [N m/rad]
-      real(wp) :: stop_damping = 0.0_wp     !! Ds [N m s/rad]
-      real(wp) :: friction = 0.0_wp         !! F [N m]
-      real(wp) :: friction_velocity = 0.0_wp !! vf [rad/s]
-      real(wp) :: latch = none_given        !! [rad]
-      real(wp) :: lock_stiffness = 0.0_wp   !! 0: a constraint [N m/rad]
-      real(wp) :: lock_damping = 0.0_wp     !! [N m s/rad]
-      logical :: held = .false.             !! locked from the start, until its release
-      real(wp) :: release_time = none_given !! [s]
-      integer :: release_after = -1
+   !> One hinge: what is given of it, and (from `touches` on) the law it has now.
+   type, extends(hinge_spring) :: hinge_mechanism
       logical :: dampers_apart = .false.    !! dampers bend no rods (reduced dampers): stops are left at their angle
-      integer :: side = 0                   !! of the freeplay: -1, 0 within, 1
       logical :: touches(2) = .false.       !! lower, upper stop
       real(wp) :: face(2) = 0.0_wp          !! depth of a stop's face where it was left [rad]
       real(wp) :: left(2) = 0.0_wp          !! when [s]
       integer :: slides = 0                 !! 0: sticks; else the sign of th'
+      logical :: is_held = .false.          !! locked from the start, until its release
       logical :: locked = .false.           !! held or latched
       logical :: latched = .false.          !! for good
       real(wp) :: lock_angle = 0.0_wp       !! [rad]
@@ -89,26 +73,12 @@ contains
       type(chain_config), intent(in) :: chain
       logical, intent(in) :: dampers_apart !! see there
 
+      self%hinge_config = given
       self%dampers_apart = dampers_apart
-      self%hinge = given%hinge
       self%stiffness = chain%hinge_stiffness(lbound(chain%hinge_stiffness, 1) + given%hinge)
       self%damping = chain%hinge_damping(lbound(chain%hinge_damping, 1) + given%hinge)
-      self%rest = given%rest_angle
-      self%freeplay = given%freeplay
-      self%inner_stiffness = given%freeplay_stiffness
-      if (given%lower_stop < none_given) self%stop(1) = given%lower_stop
-      if (given%upper_stop < none_given) self%stop(2) = given%upper_stop
-      self%stop_stiffness = given%stop_stiffness
-      self%stop_damping = given%stop_damping
-      self%friction = given%friction_moment
-      self%friction_velocity = given%friction_velocity
-      self%latch = given%latch_angle
-      self%lock_stiffness = given%lock_stiffness
-      self%lock_damping = given%lock_damping
-      self%held = given%held
-      self%release_time = given%release_time
-      self%release_after = given%release_after
       self%side = merge(0, 1, given%freeplay > 0.0_wp)
+      if (.not. given%lower_stop < none_given) self%lower_stop = -none_given ! below all angles
    end subroutine new_mechanism
 
    !> Has it this part?
@@ -119,11 +89,11 @@ contains
       case (part_spring)
          has_part = self%freeplay > 0.0_wp
       case (part_lower, part_upper)
-         has_part = abs(self%stop(part - part_lower + 1)) < none_given
+         has_part = abs(stop_angle(self, part - part_lower + 1)) < none_given
       case (part_friction)
-         has_part = self%friction > 0.0_wp
+         has_part = self%friction_moment > 0.0_wp
       case default
-         has_part = self%latch < none_given
+         has_part = self%latch_angle < none_given
       end select
    end function has_part
 
@@ -140,27 +110,31 @@ contains
       real(wp), intent(in) :: theta, theta_rate !! th [rad], th' [rad/s]
       integer :: i
 
-      if (self%freeplay > 0.0_wp) then
-         self%side = 0
-         if (abs(theta - self%rest) > self%freeplay) self%side = merge(1, -1, theta > self%rest)
-      end if
+      call self%choose_side(theta)
       do i = 1, 2
          self%touches(i) = depth(self, i, theta) > 0.0_wp .and. push(self, i, theta, theta_rate) > 0.0_wp
          self%face(i) = merge(0.0_wp, max(depth(self, i, theta), 0.0_wp), self%touches(i))
          self%left(i) = 0.0_wp
       end do
-      if (self%friction > 0.0_wp) then
+      if (self%friction_moment > 0.0_wp) then
          self%slides = 0
          if (abs(theta_rate) > self%friction_velocity) self%slides = merge(1, -1, theta_rate > 0.0_wp)
       end if
    end subroutine choose_laws
 
-   !> Depth in the lower or upper stop.
+   !> Angle of the lower or upper stop.
+   pure real(wp) function stop_angle(self, i)
+      type(hinge_mechanism), intent(in) :: self
+      integer, intent(in) :: i
+      stop_angle = merge(self%lower_stop, self%upper_stop, i == 1)
+   end function stop_angle
+
+   !> Depth in it.
    pure real(wp) function depth(self, i, theta)
       type(hinge_mechanism), intent(in) :: self
       integer, intent(in) :: i
       real(wp), intent(in) :: theta
-      depth = merge(self%stop(1) - theta, theta - self%stop(2), i == 1)
+      depth = merge(self%lower_stop - theta, theta - self%upper_stop, i == 1)
    end function depth
 
    !> Moment of a stop, divided by its stiffness [rad].
@@ -195,11 +169,7 @@ contains
       if (self%is_constrained()) return
       select case (part)
       case (part_spring)
-         if (self%side == 0) then
-            margin = self%freeplay - abs(theta - self%rest)
-         else
-            margin = self%side*(theta - self%rest) - self%freeplay
-         end if
+         margin = self%side_margin(theta)
       case (part_lower, part_upper)
          i = part - part_lower + 1
          if (self%touches(i)) then
@@ -216,8 +186,8 @@ contains
          end if
       case (part_latch)
          if (self%locked) return
-         if (self%at_latch) margin = hysteresis - abs(self%latch - theta)
-         if (self%latch_side /= 0) margin = self%latch_side*(self%latch - theta)
+         if (self%at_latch) margin = hysteresis - abs(self%latch_angle - theta)
+         if (self%latch_side /= 0) margin = self%latch_side*(self%latch_angle - theta)
          return ! the angle itself, not beyond
       case default ! there is no other part
          return
@@ -225,7 +195,7 @@ contains
       margin = margin + hysteresis
    end function margin
 
-   !> The margin of a part other than the latch has become negative: take the law next to it. Freeplay has three in a row.
+   !> The margin of a part other than the latch has become negative: take the law next to it.
    pure subroutine change(self, part, t, theta, theta_rate)
       class(hinge_mechanism), intent(inout) :: self
       integer, intent(in) :: part
@@ -234,7 +204,7 @@ contains
 
       select case (part)
       case (part_spring)
-         self%side = merge(0, merge(1, -1, theta > self%rest), self%side /= 0)
+         call self%change_side(theta)
       case (part_lower, part_upper)
          i = part - part_lower + 1
          self%touches(i) = .not. self%touches(i)
@@ -305,15 +275,15 @@ contains
    pure subroutine face_latch(self, theta)
       class(hinge_mechanism), intent(inout) :: self
       real(wp), intent(in) :: theta
-      if (.not. self%latch < none_given) return
-      self%at_latch = abs(self%latch - theta) < hysteresis
-      self%latch_side = merge(0, merge(1, -1, self%latch > theta), self%at_latch)
+      if (.not. self%latch_angle < none_given) return
+      self%at_latch = abs(self%latch_angle - theta) < hysteresis
+      self%latch_side = merge(0, merge(1, -1, self%latch_angle > theta), self%at_latch)
    end subroutine face_latch
 
    !> Lock at the latch, for good.
    pure subroutine lock_at_latch(self)
       class(hinge_mechanism), intent(inout) :: self
-      call self%lock(self%latch)
+      call self%lock(self%latch_angle)
       self%latched = .true.
    end subroutine lock_at_latch
 
@@ -324,7 +294,7 @@ contains
       real(wp), intent(out) :: lost !! [J]
       lost = 0.5_wp*self%lock_stiffness*(theta - self%lock_angle)**2
       self%locked = .false.
-      self%held = .false.
+      self%is_held = .false.
       call self%face_latch(theta)
    end subroutine release
 
@@ -342,55 +312,31 @@ contains
       real(wp), intent(out) :: friction           !! f [N m]
       integer :: i
 
-      stiffness = 0.0_wp
-      constant = 0.0_wp
-      damping = self%damping
-      friction = 0.0_wp
-      if (self%freeplay > 0.0_wp) call add_spring(self%inner_stiffness, self%rest, stiffness, constant)
-      if (self%side /= 0) call add_spring(merge(self%stiffness - self%inner_stiffness, self%stiffness, self%freeplay > 0.0_wp), &
-                                          self%rest + self%side*self%freeplay, stiffness, constant)
+      call self%linear_moment(stiffness, damping, constant, friction)
       do i = 1, 2
          if (.not. self%touches(i)) cycle
-         call add_spring(self%stop_stiffness, self%stop(i), stiffness, constant)
+         call add_spring(self%stop_stiffness, stop_angle(self, i), stiffness, constant)
          damping = damping + self%stop_damping
       end do
       if (self%locked) then
          call add_spring(self%lock_stiffness, self%lock_angle, stiffness, constant)
          damping = damping + self%lock_damping
       end if
-      if (.not. self%friction > 0.0_wp .or. self%is_constrained()) return
+      if (.not. self%friction_moment > 0.0_wp .or. self%is_constrained()) return
       if (self%slides == 0) then
-         damping = damping + self%friction/self%friction_velocity
+         damping = damping + self%friction_moment/self%friction_velocity
       else
-         friction = self%slides*self%friction
+         friction = friction + self%slides*self%friction_moment
       end if
    end subroutine linear_law
 
-   !> T = C th + t0 of one more spring.
-   pure subroutine add_spring(c, slack, stiffness, constant)
-      real(wp), intent(in) :: c, slack
-      real(wp), intent(inout) :: stiffness, constant
-      stiffness = stiffness + c
-      constant = constant - c*slack
-   end subroutine add_spring
-
-   !> Energy of its springs, as sums of squares: the differences of a parabola's coefficients would lose digits.
+   !> Energy of its springs [J].
    pure real(wp) function energy(self, theta)
       class(hinge_mechanism), intent(in) :: self
-      real(wp), intent(in) :: theta
-      real(wp) :: e
+      real(wp), intent(in) :: theta !! th [rad]
       integer :: i
 
-      e = theta - self%rest
-      if (self%side == 0) then
-         energy = 0.5_wp*self%inner_stiffness*e**2
-      else if (self%freeplay > 0.0_wp) then
-         associate (beyond => self%side*e - self%freeplay)
-            energy = 0.5_wp*self%stiffness*beyond**2 + self%inner_stiffness*self%freeplay*(beyond + 0.5_wp*self%freeplay)
-         end associate
-      else
-         energy = 0.5_wp*self%stiffness*e**2
-      end if
+      energy = self%spring_energy(theta)
       do i = 1, 2
          if (self%touches(i)) energy = energy + 0.5_wp*self%stop_stiffness*depth(self, i, theta)**2
       end do
