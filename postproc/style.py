@@ -38,6 +38,7 @@ matplotlib.rcParams.update({
     "axes.labelsize": 9,
     "figure.titlesize": 10,
     "figure.dpi": 100,
+    "figure.autolayout": False,
     "legend.fontsize": 8,
     "legend.frameon": True,
     "legend.framealpha": 0.85,
@@ -53,7 +54,6 @@ matplotlib.rcParams.update({
     "grid.linewidth": 0.5,
     "lines.linewidth": 1.2,
     "lines.markersize": 4.5,
-    "axes.formatter.use_mathtext": True,
     "axes.formatter.limits": (-3, 5),
     "axes.formatter.useoffset": False,
     "savefig.dpi": 160,
@@ -133,7 +133,7 @@ def legend_below(figure: Figure, panels: Iterable[Axes]) -> None:
 
 def factor_into_label(axis: Axis) -> None:
     """Write a common factor of the tick labels into the unit: [m] becomes [10^-5 m]. At the end of the axis it may be covered."""
-    factor = re.search(r"10\^\{(-?\d+)\}", axis.get_offset_text().get_text().replace("−", "-"))
+    factor = re.fullmatch(r"1e(-?\d+)", axis.get_offset_text().get_text().replace("−", "-"))
     if factor is None or not axis.get_offset_text().get_visible():
         return
     power = f"$10^{{{factor[1]}}}$"
@@ -166,14 +166,15 @@ def wrap_title(axes: Axes) -> None:
 
 
 def settle(figure: Figure) -> None:
-    """Find the layout once for all formats. Axes of equal scale move when they are drawn, hence the second pass."""
-    figure.draw_without_rendering()
+    """Find the layout once for all formats; again with the labels and titles that follow from the first one."""
+    engine = figure.get_layout_engine()
+    engine.execute(figure)
     for axes in figure.axes:
         for axis in (axes.xaxis, axes.yaxis):
             factor_into_label(axis)
         wrap_title(axes)
-    figure.draw_without_rendering()
-    figure.set_layout_engine("none")
+    engine.execute(figure)
+    figure.set_layout_engine(None)  # with any other, each file would be drawn twice
 
 
 def save(figure: Figure, out: str | pathlib.Path) -> list[pathlib.Path]:
