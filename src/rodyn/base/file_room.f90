@@ -13,8 +13,8 @@
 module rodyn_file_room
    use, intrinsic :: iso_c_binding, only: c_char, c_int, c_int64_t, c_null_char
    use rodyn_kinds, only: i8, wp
-   use rodyn_posix, only: efbig, eintr, einval, enodev, enosys, enotsup, error_text, last_failure, last_failure_is, posix_close, &
-      posix_fsync, posix_open
+   use rodyn_posix, only: efbig, eintr, einval, enodev, enosys, enotsup, error_text, failure_of, last_failure, last_failure_is, &
+      posix_close, posix_fsync, posix_ftruncate, posix_open
    use rodyn_resources, only: file_size_limit
    implicit none (type, external)
    private
@@ -39,54 +39,41 @@ module rodyn_file_room
    end type file_room
 
    interface
-      function posix_lseek(descriptor, offset, whence) result(place) bind(c, name='lseek')
+      integer(c_int64_t) function posix_lseek(descriptor, offset, whence) bind(c, name='lseek')
          import :: c_int, c_int64_t
          implicit none (type, external)
          integer(c_int), value :: descriptor, whence
          integer(c_int64_t), value :: offset
-         integer(c_int64_t) :: place
       end function posix_lseek
 
-      function posix_fallocate(descriptor, mode, offset, bytes) result(status) bind(c, name='fallocate')
+      integer(c_int) function posix_fallocate(descriptor, mode, offset, bytes) bind(c, name='fallocate')
          import :: c_int, c_int64_t
          implicit none (type, external)
          integer(c_int), value :: descriptor, mode
          integer(c_int64_t), value :: offset, bytes
-         integer(c_int) :: status
       end function posix_fallocate
 
-      function posix_pwrite(descriptor, bytes, count, offset) result(written) bind(c, name='pwrite')
+      integer(c_int64_t) function posix_pwrite(descriptor, bytes, count, offset) bind(c, name='pwrite')
          import :: c_char, c_int, c_int64_t
          implicit none (type, external)
          integer(c_int), value :: descriptor
          character(kind=c_char), intent(in) :: bytes(*)
          integer(c_int64_t), value :: count, offset
-         integer(c_int64_t) :: written
       end function posix_pwrite
 
-      function posix_fstatfs(descriptor, words) result(status) bind(c, name='fstatfs')
+      integer(c_int) function posix_fstatfs(descriptor, words) bind(c, name='fstatfs')
          import :: c_int, c_int64_t
          implicit none (type, external)
          integer(c_int), value :: descriptor
          integer(c_int64_t), intent(inout) :: words(*) !! the first: kind of file system
-         integer(c_int) :: status
       end function posix_fstatfs
 
-      function posix_ftruncate(descriptor, bytes) result(status) bind(c, name='ftruncate')
-         import :: c_int, c_int64_t
-         implicit none (type, external)
-         integer(c_int), value :: descriptor
-         integer(c_int64_t), value :: bytes
-         integer(c_int) :: status
-      end function posix_ftruncate
-
-      function posix_sendfile(to, from, offset, bytes) result(sent) bind(c, name='sendfile')
+      integer(c_int64_t) function posix_sendfile(to, from, offset, bytes) bind(c, name='sendfile')
          import :: c_int, c_int64_t
          implicit none (type, external)
          integer(c_int), value :: to, from
          integer(c_int64_t), intent(inout) :: offset
          integer(c_int64_t), value :: bytes
-         integer(c_int64_t) :: sent
       end function posix_sendfile
    end interface
 
@@ -99,9 +86,8 @@ contains
       character(len=:), allocatable :: failure
       integer(c_int64_t) :: words(32)
 
-      failure = ''
       self%descriptor = posix_open(path//c_null_char, o_rdwr)
-      if (self%descriptor < 0) failure = last_failure()
+      failure = failure_of(self%descriptor)
       self%spare = 0
       if (posix_fstatfs(self%descriptor, words) == 0) self%spare = merge(bytes_of_copies, 0_i8, any(words(1) == copying))
    end function open_room
@@ -161,9 +147,7 @@ contains
             failure = last_failure()
          end if
       end do
-      if (len(failure) == 0) then
-         if (posix_fsync(self%descriptor) /= 0) failure = last_failure()
-      end if
+      if (len(failure) == 0) failure = failure_of(posix_fsync(self%descriptor))
       status = posix_ftruncate(self%descriptor, at)
    end function try_with_zeros
 

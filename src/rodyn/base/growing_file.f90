@@ -8,9 +8,9 @@
 !>
 !> As in `rodyn_posix`, calls return why they failed, empty on success.
 module rodyn_growing_file
-   use, intrinsic :: iso_c_binding, only: c_int, c_int64_t, c_loc, c_null_char, c_size_t
+   use, intrinsic :: iso_c_binding, only: c_int, c_loc, c_null_char, c_size_t
    use rodyn_kinds, only: i8
-   use rodyn_posix, only: last_failure, posix_close, posix_fsync, posix_open, write_all
+   use rodyn_posix, only: failure_of, posix_close, posix_fsync, posix_ftruncate, posix_open, write_all
    use rodyn_posix_files, only: create_file, file_bytes, o_append, o_wronly
    implicit none (type, external)
    private
@@ -28,16 +28,6 @@ module rodyn_growing_file
       procedure :: close => close_file
    end type growing_file
 
-   interface
-      function posix_ftruncate(descriptor, bytes) result(status) bind(c, name='ftruncate')
-         import :: c_int, c_int64_t
-         implicit none (type, external)
-         integer(c_int), value :: descriptor
-         integer(c_int64_t), value :: bytes
-         integer(c_int) :: status
-      end function posix_ftruncate
-   end interface
-
 contains
 
    pure logical function is_open(self)
@@ -51,10 +41,9 @@ contains
       character(len=*), intent(in) :: path
       character(len=:), allocatable :: failure
 
-      failure = ''
       self%bytes = 0
       self%descriptor = create_file(path)
-      if (.not. self%is_open()) failure = last_failure()
+      failure = failure_of(self%descriptor)
    end function create
 
    !> Go on with a file that is there.
@@ -63,10 +52,9 @@ contains
       character(len=*), intent(in) :: path
       character(len=:), allocatable :: failure
 
-      failure = ''
       self%bytes = file_bytes(path)
       self%descriptor = posix_open(path//c_null_char, ior(o_wronly, o_append))
-      if (.not. self%is_open()) failure = last_failure()
+      failure = failure_of(self%descriptor)
    end function reopen
 
    !> Add words at the end: all of them or none.
@@ -88,8 +76,7 @@ contains
    function sync(self) result(failure)
       class(growing_file), intent(in) :: self
       character(len=:), allocatable :: failure
-      failure = ''
-      if (posix_fsync(self%descriptor) /= 0) failure = last_failure()
+      failure = failure_of(posix_fsync(self%descriptor))
    end function sync
 
    subroutine close_file(self)

@@ -2,230 +2,175 @@
 !>
 !> Calls that can fail return the reason as text, empty on success, so that callers word their own messages.
 module rodyn_posix
-   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_funptr, c_int, c_int16_t, c_intptr_t, &
-      c_loc, c_long, c_null_char, c_null_funptr, c_null_ptr, c_ptr, c_size_t
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_funptr, c_int, c_int16_t, c_int64_t, &
+      c_intptr_t, c_loc, c_long, c_null_char, c_null_funptr, c_ptr, c_size_t
+   use rodyn_text, only: to_text
    implicit none (type, external)
    private
-   public :: posix_close, posix_closedir, posix_fsync, posix_open, posix_opendir, posix_signal, sig_ign ! for `rodyn_posix_files`
+   public :: posix_close, posix_fsync, posix_ftruncate, posix_open, posix_signal, sig_ign ! for the other modules of files
    public :: read_all
    public :: process_id, parent_id, host_name, utc_now
    public :: path_exists, same_path, is_directory, is_special, is_writable, parent_directory
    public :: sync_path, rename_over, rename_new, remove_file
-   public :: ignore_signal, sigpipe, sigxfsz, write_all, write_output, write_text, standard_output, standard_error
-   public :: error_text, last_failure, last_failure_is, eacces, eagain, eexist, efbig, eintr, einval, enodev, enosys, enotsup
+   public :: ignore_signal, sigpipe, sigxfsz, write_all, write_text, standard_output, standard_error
+   public :: c_text, error_text, failure_of, last_failure, last_failure_is
+   public :: eacces, eagain, eexist, efbig, eintr, einval, enodev, enosys, enotsup
 
-   integer(c_int), parameter :: f_ok = 0, w_ok = 2, x_ok = 1               ! <unistd.h>
+   integer(c_int), parameter :: f_ok = 0, x_ok = 1, w_ok = 2, r_ok = 4     ! <unistd.h>
    integer(c_int), parameter :: o_rdonly = 0                               ! <fcntl.h>
    integer(c_int), parameter :: eperm = 1, eintr = 4, eagain = 11, enomem = 12, eacces = 13, eexist = 17 ! <errno.h>, Linux
    integer(c_int), parameter :: enodev = 19, einval = 22, efbig = 27, emlink = 31, enosys = 38, enotsup = 95 ! likewise
    integer(c_int), parameter :: sigpipe = 13, sigxfsz = 25                 ! <signal.h>, Linux
    integer(c_int), parameter :: standard_output = 1, standard_error = 2    ! <unistd.h>
    integer(c_intptr_t), parameter :: sig_ign = 1_c_intptr_t                ! <signal.h>
+   integer, parameter :: statx_words = 128, at_mode = 15                   ! struct statx, in words of 16 bits
+   integer, parameter :: all_kinds = int(o'170000'), file_kind = int(o'100000'), directory_kind = int(o'040000') ! <sys/stat.h>
 
    interface
-      function posix_getpid() result(pid) bind(c, name='getpid')
+      !> Number of this process.
+      integer(c_int) function process_id() bind(c, name='getpid')
          import :: c_int
          implicit none (type, external)
-         integer(c_int) :: pid
-      end function posix_getpid
+      end function process_id
 
-      function posix_getppid() result(pid) bind(c, name='getppid')
+      !> Number of the process that started this one.
+      integer(c_int) function parent_id() bind(c, name='getppid')
          import :: c_int
          implicit none (type, external)
-         integer(c_int) :: pid
-      end function posix_getppid
+      end function parent_id
 
-      function posix_gethostname(name, length) result(status) bind(c, name='gethostname')
+      integer(c_int) function posix_gethostname(name, length) bind(c, name='gethostname')
          import :: c_char, c_int, c_size_t
          implicit none (type, external)
          character(kind=c_char), intent(out) :: name(*)
          integer(c_size_t), value :: length
-         integer(c_int) :: status
       end function posix_gethostname
 
-      function posix_write(descriptor, data, count) result(written) bind(c, name='write')
+      integer(c_intptr_t) function posix_write(descriptor, data, count) bind(c, name='write')
          import :: c_int, c_intptr_t, c_ptr, c_size_t
          implicit none (type, external)
          integer(c_int), intent(in), value :: descriptor
          type(c_ptr), intent(in), value :: data
          integer(c_size_t), intent(in), value :: count
-         integer(c_intptr_t) :: written
       end function posix_write
 
-      function posix_read(descriptor, bytes, count) result(n) bind(c, name='read')
+      integer(c_intptr_t) function posix_read(descriptor, bytes, count) bind(c, name='read')
          import :: c_char, c_int, c_intptr_t, c_size_t
          implicit none (type, external)
          integer(c_int), intent(in), value :: descriptor
          character(kind=c_char), intent(inout) :: bytes(*)
          integer(c_size_t), intent(in), value :: count
-         integer(c_intptr_t) :: n
       end function posix_read
 
       ! variadic in C; without its third argument the call is an ordinary one
-      function posix_open(path, flags) result(descriptor) bind(c, name='open')
+      integer(c_int) function posix_open(path, flags) bind(c, name='open')
          import :: c_char, c_int
          implicit none (type, external)
          character(kind=c_char), intent(in) :: path(*)
          integer(c_int), value :: flags
-         integer(c_int) :: descriptor
       end function posix_open
 
-      function posix_close(descriptor) result(status) bind(c, name='close')
+      integer(c_int) function posix_close(descriptor) bind(c, name='close')
          import :: c_int
          implicit none (type, external)
          integer(c_int), value :: descriptor
-         integer(c_int) :: status
       end function posix_close
 
-      function posix_fsync(descriptor) result(status) bind(c, name='fsync')
+      integer(c_int) function posix_fsync(descriptor) bind(c, name='fsync')
          import :: c_int
          implicit none (type, external)
          integer(c_int), value :: descriptor
-         integer(c_int) :: status
       end function posix_fsync
 
-      function posix_access(path, mode) result(status) bind(c, name='access')
+      integer(c_int) function posix_ftruncate(descriptor, bytes) bind(c, name='ftruncate')
+         import :: c_int, c_int64_t
+         implicit none (type, external)
+         integer(c_int), value :: descriptor
+         integer(c_int64_t), value :: bytes
+      end function posix_ftruncate
+
+      integer(c_int) function posix_access(path, mode) bind(c, name='access')
          import :: c_char, c_int
          implicit none (type, external)
          character(kind=c_char), intent(in) :: path(*)
          integer(c_int), value :: mode
-         integer(c_int) :: status
       end function posix_access
 
-      !> The path without links and dots, in memory the caller frees; null if there is no such file.
-      function posix_realpath(path, buffer) result(resolved) bind(c, name='realpath')
-         import :: c_char, c_ptr
-         implicit none (type, external)
-         character(kind=c_char), intent(in) :: path(*)
-         type(c_ptr), intent(in), value :: buffer !! null
-         type(c_ptr) :: resolved
-      end function posix_realpath
-
-      function posix_strcmp(a, b) result(order) bind(c, name='strcmp')
-         import :: c_int, c_ptr
-         implicit none (type, external)
-         type(c_ptr), intent(in), value :: a, b
-         integer(c_int) :: order
-      end function posix_strcmp
-
-      subroutine posix_free(address) bind(c, name='free')
-         import :: c_ptr
-         implicit none (type, external)
-         type(c_ptr), intent(in), value :: address
-      end subroutine posix_free
-
-      function posix_opendir(path) result(stream) bind(c, name='opendir')
-         import :: c_char, c_ptr
-         implicit none (type, external)
-         character(kind=c_char), intent(in) :: path(*)
-         type(c_ptr) :: stream
-      end function posix_opendir
-
-      function posix_closedir(stream) result(status) bind(c, name='closedir')
-         import :: c_int, c_ptr
-         implicit none (type, external)
-         type(c_ptr), value :: stream
-         integer(c_int) :: status
-      end function posix_closedir
-
-      ! statx(2) has one layout on all processors: 28 bytes before the 16 bits of the mode
-      function posix_statx(directory, path, flags, mask, words) result(status) bind(c, name='statx')
-         import :: c_char, c_int, c_int16_t
+      ! statx(2) has one layout on all processors
+      integer(c_int) function posix_statx(directory, path, flags, mask, words) bind(c, name='statx')
+         import :: c_char, c_int, c_int16_t, statx_words
          implicit none (type, external)
          integer(c_int), value :: directory, flags, mask
          character(kind=c_char), intent(in) :: path(*)
-         integer(c_int16_t), intent(out) :: words(128)
-         integer(c_int) :: status
+         integer(c_int16_t), intent(out) :: words(statx_words)
       end function posix_statx
 
-      function posix_rename(old, new) result(status) bind(c, name='rename')
+      integer(c_int) function posix_rename(old, new) bind(c, name='rename')
          import :: c_char, c_int
          implicit none (type, external)
          character(kind=c_char), intent(in) :: old(*), new(*)
-         integer(c_int) :: status
       end function posix_rename
 
-      function posix_link(old, new) result(status) bind(c, name='link')
+      integer(c_int) function posix_link(old, new) bind(c, name='link')
          import :: c_char, c_int
          implicit none (type, external)
          character(kind=c_char), intent(in) :: old(*), new(*)
-         integer(c_int) :: status
       end function posix_link
 
-      function posix_unlink(path) result(status) bind(c, name='unlink')
+      integer(c_int) function posix_unlink(path) bind(c, name='unlink')
          import :: c_char, c_int
          implicit none (type, external)
          character(kind=c_char), intent(in) :: path(*)
-         integer(c_int) :: status
       end function posix_unlink
 
-      function posix_signal(number, handler) result(previous) bind(c, name='signal')
+      type(c_funptr) function posix_signal(number, handler) bind(c, name='signal')
          import :: c_funptr, c_int
          implicit none (type, external)
          integer(c_int), value :: number
          type(c_funptr), value :: handler
-         type(c_funptr) :: previous
       end function posix_signal
 
-      function posix_errno_location() result(location) bind(c, name='__errno_location')
+      type(c_ptr) function posix_errno_location() bind(c, name='__errno_location')
          import :: c_ptr
          implicit none (type, external)
-         type(c_ptr) :: location
       end function posix_errno_location
 
-      function posix_strerror(number) result(text) bind(c, name='strerror')
+      type(c_ptr) function posix_strerror(number) bind(c, name='strerror')
          import :: c_int, c_ptr
          implicit none (type, external)
          integer(c_int), value :: number
-         type(c_ptr) :: text
       end function posix_strerror
 
-      function posix_strlen(text) result(length) bind(c, name='strlen')
+      integer(c_size_t) function posix_strlen(text) bind(c, name='strlen')
          import :: c_ptr, c_size_t
          implicit none (type, external)
          type(c_ptr), value :: text
-         integer(c_size_t) :: length
       end function posix_strlen
 
       ! time_t is taken as long, which it is on every 64-bit Linux
-      function posix_time(seconds) result(again) bind(c, name='time')
+      integer(c_long) function posix_time(seconds) bind(c, name='time')
          import :: c_long
          implicit none (type, external)
          integer(c_long), intent(out) :: seconds
-         integer(c_long) :: again
       end function posix_time
 
-      function posix_gmtime(seconds) result(broken_down) bind(c, name='gmtime')
+      type(c_ptr) function posix_gmtime(seconds) bind(c, name='gmtime')
          import :: c_long, c_ptr
          implicit none (type, external)
          integer(c_long), intent(in) :: seconds
-         type(c_ptr) :: broken_down
       end function posix_gmtime
 
-      function posix_strftime(text, size, format, broken_down) result(length) bind(c, name='strftime')
+      integer(c_size_t) function posix_strftime(text, size, format, broken_down) bind(c, name='strftime')
          import :: c_char, c_ptr, c_size_t
          implicit none (type, external)
          character(kind=c_char), intent(out) :: text(*)
          integer(c_size_t), value :: size
          character(kind=c_char), intent(in) :: format(*)
          type(c_ptr), value :: broken_down
-         integer(c_size_t) :: length
       end function posix_strftime
    end interface
 
 contains
-
-   !> Number of this process.
-   function process_id() result(pid)
-      integer :: pid
-      pid = int(posix_getpid())
-   end function process_id
-
-   !> Number of the process that started this one.
-   function parent_id() result(pid)
-      integer :: pid
-      pid = int(posix_getppid())
-   end function parent_id
 
    !> Name of this machine; 'unknown' if the system does not tell.
    function host_name() result(name)
@@ -261,43 +206,42 @@ contains
    function same_path(a, b) result(same)
       character(len=*), intent(in) :: a, b
       logical :: same
-      type(c_ptr) :: whole_a, whole_b
-
-      whole_a = posix_realpath(a//c_null_char, c_null_ptr)
-      whole_b = posix_realpath(b//c_null_char, c_null_ptr)
-      same = c_associated(whole_a) .and. c_associated(whole_b)
-      if (same) same = posix_strcmp(whole_a, whole_b) == 0
-      if (c_associated(whole_a)) call posix_free(whole_a)
-      if (c_associated(whole_b)) call posix_free(whole_b)
+      integer, parameter :: number_and_device(8) = [17, 18, 19, 20, 69, 70, 71, 72]
+      integer(c_int16_t) :: of_a(statx_words), of_b(statx_words)
+      of_a = status_of(a)
+      of_b = status_of(b)
+      same = of_a(at_mode) /= 0 .and. all(of_a(number_and_device) == of_b(number_and_device))
    end function same_path
 
    !> Is this a directory that can be read?
    function is_directory(path) result(directory)
       character(len=*), intent(in) :: path
       logical :: directory
-      type(c_ptr) :: stream
-      integer(c_int) :: status
-
-      stream = posix_opendir(path//c_null_char)
-      directory = c_associated(stream)
-      if (directory) status = posix_closedir(stream)
+      directory = kind_of(path) == directory_kind .and. posix_access(path//c_null_char, r_ok) == 0
    end function is_directory
 
    !> Is there something at this path that is neither a file nor a directory: a device, a pipe, a socket?
    function is_special(path) result(special)
       character(len=*), intent(in) :: path
       logical :: special
-      integer(c_int), parameter :: at_fdcwd = -100, statx_type = 1                   ! <fcntl.h>, <sys/stat.h>
-      integer, parameter :: mode_type = int(o'170000'), regular = int(o'100000'), directory = int(o'040000')
-      integer(c_int16_t) :: words(128)
-      integer :: kind_of
-
-      special = .false.
-      words = 0_c_int16_t
-      if (posix_statx(at_fdcwd, path//c_null_char, 0_c_int, statx_type, words) /= 0) return
-      kind_of = iand(int(words(15)), mode_type)
-      special = kind_of /= regular .and. kind_of /= directory
+      special = all(kind_of(path) /= [0, file_kind, directory_kind])
    end function is_special
+
+   !> Kind of what a path leads to; 0: nothing.
+   integer function kind_of(path)
+      character(len=*), intent(in) :: path
+      integer(c_int16_t) :: words(statx_words)
+      words = status_of(path)
+      kind_of = iand(int(words(at_mode)), all_kinds)
+   end function kind_of
+
+   !> What the system knows of the file that a path leads to: zeros if there is none.
+   function status_of(path) result(words)
+      character(len=*), intent(in) :: path
+      integer(c_int16_t) :: words(statx_words)
+      integer(c_int), parameter :: at_fdcwd = -100, statx_type_and_number = int(z'101') ! <fcntl.h>, <sys/stat.h>
+      if (posix_statx(at_fdcwd, path//c_null_char, 0_c_int, statx_type_and_number, words) /= 0) words = 0_c_int16_t
+   end function status_of
 
    !> May this process make files in a directory?
    function is_writable(directory) result(writable)
@@ -329,13 +273,10 @@ contains
       character(len=:), allocatable :: failure !! empty on success
       integer(c_int) :: descriptor, status
 
-      failure = ''
       descriptor = posix_open(path//c_null_char, o_rdonly)
-      if (descriptor < 0) then
-         failure = last_failure()
-         return
-      end if
-      if (posix_fsync(descriptor) /= 0) failure = last_failure()
+      failure = failure_of(descriptor)
+      if (descriptor < 0) return
+      failure = failure_of(posix_fsync(descriptor))
       status = posix_close(descriptor)
    end function sync_path
 
@@ -343,9 +284,7 @@ contains
    function rename_over(old, new) result(failure)
       character(len=*), intent(in) :: old, new
       character(len=:), allocatable :: failure !! empty on success
-
-      failure = ''
-      if (posix_rename(old//c_null_char, new//c_null_char) /= 0) failure = last_failure()
+      failure = failure_of(posix_rename(old//c_null_char, new//c_null_char))
    end function rename_over
 
    !> Rename a file unless the new name is taken, with no instant in which another process could slip in:
@@ -380,9 +319,7 @@ contains
    function remove_file(path) result(failure)
       character(len=*), intent(in) :: path
       character(len=:), allocatable :: failure !! empty on success
-
-      failure = ''
-      if (posix_unlink(path//c_null_char) /= 0) failure = last_failure()
+      failure = failure_of(posix_unlink(path//c_null_char))
    end function remove_file
 
    !> Let what causes a signal fail with a reason instead: a write beyond the file-size limit (SIGXFSZ, EFBIG), or into a
@@ -392,13 +329,6 @@ contains
       type(c_funptr) :: previous
       previous = posix_signal(number, transfer(sig_ign, c_null_funptr))
    end subroutine ignore_signal
-
-   !> Write to standard output at once. (Fortran's own units notice a full disk or a closed output too late, or never.)
-   function write_output(text) result(failure)
-      character(len=*), intent(in) :: text
-      character(len=:), allocatable :: failure !! empty on success
-      failure = write_text(standard_output, text)
-   end function write_output
 
    !> Write a text to an open file.
    function write_text(descriptor, text) result(failure)
@@ -443,10 +373,8 @@ contains
 
       descriptor = standard_input
       if (len(path) > 0) descriptor = posix_open(path//c_null_char, o_rdonly)
-      if (descriptor < 0) then
-         failure = last_failure()
-         return
-      end if
+      failure = failure_of(descriptor)
+      if (descriptor < 0) return
       call read_until_end(descriptor, most, text, failure)
       if (len(path) > 0) status = posix_close(descriptor)
    end subroutine read_all
@@ -470,7 +398,7 @@ contains
          if (n == 0) exit
          if (n > 0) then
             length = length + int(n)
-            if (length > most) failure = 'more than '//megabytes(most)//' MB'
+            if (length > most) failure = 'more than '//to_text(most/1024**2)//' MB'
          else if (errno() /= eintr) then
             failure = last_failure()
          end if
@@ -496,19 +424,19 @@ contains
       call move_alloc(larger, buffer)
    end subroutine resize
 
-   pure function megabytes(bytes) result(text)
-      integer, intent(in) :: bytes
-      character(len=:), allocatable :: text
-      character(len=12) :: digits
-      write (digits, '(i0)') bytes/1024**2
-      text = trim(digits)
-   end function megabytes
-
    !> Why the last call failed.
    function last_failure() result(text)
       character(len=:), allocatable :: text
       text = error_text(errno())
    end function last_failure
+
+   !> Why the call that returned this failed; empty: it did not.
+   function failure_of(status) result(failure)
+      integer(c_int), intent(in) :: status !! < 0: failed
+      character(len=:), allocatable :: failure
+      failure = ''
+      if (status < 0) failure = last_failure()
+   end function failure_of
 
    !> Did the last call fail for this reason (an errno of Linux)?
    function last_failure_is(number) result(same)
@@ -528,16 +456,23 @@ contains
    function error_text(number) result(text)
       integer(c_int), intent(in) :: number
       character(len=:), allocatable :: text
-      type(c_ptr) :: raw
+      text = c_text(posix_strerror(number))
+   end function error_text
+
+   !> A text of C; empty for a null pointer.
+   function c_text(address) result(text)
+      type(c_ptr), intent(in) :: address
+      character(len=:), allocatable :: text
       character(kind=c_char), pointer :: characters(:)
       integer :: i
 
-      raw = posix_strerror(number)
-      call c_f_pointer(raw, characters, [posix_strlen(raw)])
-      allocate (character(len=size(characters)) :: text)
+      text = ''
+      if (.not. c_associated(address)) return
+      call c_f_pointer(address, characters, [posix_strlen(address)])
+      text = repeat(' ', size(characters))
       do i = 1, size(characters)
          text(i:i) = characters(i)
       end do
-   end function error_text
+   end function c_text
 
 end module rodyn_posix

@@ -7,8 +7,9 @@ module rodyn_posix_files
    use rodyn_checksum, only: crc64_text
    use rodyn_errors, only: error_type, exit_bad_input, raise
    use rodyn_kinds, only: i8
-   use rodyn_posix, only: eacces, eagain, eexist, ignore_signal, last_failure, last_failure_is, parent_directory, path_exists, &
-      rename_over, sig_ign, sync_path, write_all, posix_close, posix_closedir, posix_fsync, posix_open, posix_opendir, posix_signal
+   use rodyn_posix, only: c_text, eacces, eagain, eexist, failure_of, ignore_signal, last_failure, last_failure_is, &
+      parent_directory, path_exists, rename_over, sig_ign, sync_path, write_all, posix_close, posix_fsync, posix_open, posix_signal
+   use rodyn_sorting, only: sorted_order
    use rodyn_text, only: to_text
    implicit none (type, external)
    private
@@ -50,38 +51,45 @@ module rodyn_posix_files
    integer(c_int), volatile :: caught = 0
 
    interface
-      function posix_creat(path, mode) result(descriptor) bind(c, name='creat')
+      integer(c_int) function posix_creat(path, mode) bind(c, name='creat')
          import :: c_char, c_int
          implicit none (type, external)
          character(kind=c_char), intent(in) :: path(*)
          integer(c_int), value :: mode
-         integer(c_int) :: descriptor
       end function posix_creat
 
-      function posix_mkdir(path, mode) result(status) bind(c, name='mkdir')
+      integer(c_int) function posix_mkdir(path, mode) bind(c, name='mkdir')
          import :: c_char, c_int
          implicit none (type, external)
          character(kind=c_char), intent(in) :: path(*)
          integer(c_int), value :: mode
-         integer(c_int) :: status
       end function posix_mkdir
 
-      function posix_readdir(stream) result(entry) bind(c, name='readdir')
+      type(c_ptr) function posix_opendir(path) bind(c, name='opendir')
+         import :: c_char, c_ptr
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+      end function posix_opendir
+
+      integer(c_int) function posix_closedir(stream) bind(c, name='closedir')
+         import :: c_int, c_ptr
+         implicit none (type, external)
+         type(c_ptr), value :: stream
+      end function posix_closedir
+
+      type(c_ptr) function posix_readdir(stream) bind(c, name='readdir')
          import :: c_ptr
          implicit none (type, external)
          type(c_ptr), value :: stream
-         type(c_ptr) :: entry
       end function posix_readdir
 
       ! variadic in C; with integers and pointers only, all calling conventions of Linux pass these the same way
-      function posix_fcntl(descriptor, command, lock) result(status) bind(c, name='fcntl')
+      integer(c_int) function posix_fcntl(descriptor, command, lock) bind(c, name='fcntl')
          import :: c_int, flock_record
          implicit none (type, external)
          integer(c_int), value :: descriptor, command
          type(flock_record), intent(inout) :: lock
-         integer(c_int) :: status
       end function posix_fcntl
-
    end interface
 
 contains
@@ -97,20 +105,19 @@ contains
       above = parent_directory(path)
       if (above /= path .and. .not. path_exists(above)) failure = make_directory(above)
       if (len(failure) > 0) return
-      if (posix_mkdir(path//c_null_char, directory_mode) == 0) return
-      if (.not. last_failure_is(eexist)) failure = last_failure()
+      failure = failure_of(posix_mkdir(path//c_null_char, directory_mode))
+      if (len(failure) > 0 .and. last_failure_is(eexist)) failure = ''
    end function make_directory
 
    !> Names in a directory, sorted, without those that begin with a dot.
    subroutine list_directory(path, names)
       character(len=*), intent(in) :: path
       character(len=longest_name), allocatable, intent(out) :: names(:) !! empty if it cannot be read
-      character(len=longest_name), allocatable :: larger(:)
       character(len=longest_name) :: name
       character(kind=c_char), pointer :: bytes(:)
       type(c_ptr) :: stream, entry
       integer(c_int) :: status
-      integer :: i, n
+      integer :: n
 
       allocate (names(64))
       n = 0
@@ -119,57 +126,17 @@ contains
          do
             entry = posix_readdir(stream)
             if (.not. c_associated(entry)) exit
-            call c_f_pointer(entry, bytes, [name_offset + longest_name + 1])
-            name = ''
-            do i = 1, longest_name
-               if (bytes(name_offset + i) == c_null_char) exit
-               name(i:i) = bytes(name_offset + i)
-            end do
+            call c_f_pointer(entry, bytes, [name_offset + 1])
+            name = c_text(c_loc(bytes(name_offset + 1)))
             if (name(1:1) == '.') cycle
-            if (n == size(names)) then
-               allocate (larger(2*n))
-               larger(:n) = names
-               call move_alloc(larger, names)
-            end if
+            if (n == size(names)) names = [names, names]
             n = n + 1
             names(n) = name
          end do
          status = posix_closedir(stream)
       end if
-      names = names(:n)
-      call sort_names(names)
+      names = names(sorted_order(names(:n)))
    end subroutine list_directory
-
-   !> Merge sort.
-   recursive subroutine sort_names(names)
-      character(len=longest_name), intent(inout) :: names(:)
-      character(len=longest_name), allocatable :: left(:), right(:)
-      integer :: half, i, j, k
-
-      if (size(names) < 2) return
-      half = size(names)/2
-      left = names(:half)
-      right = names(half + 1:)
-      call sort_names(left)
-      call sort_names(right)
-      i = 1
-      j = 1
-      do k = 1, size(names)
-         if (j > size(right)) then
-            names(k) = left(i)
-            i = i + 1
-         else if (i > size(left)) then
-            names(k) = right(j)
-            j = j + 1
-         else if (left(i) <= right(j)) then
-            names(k) = left(i)
-            i = i + 1
-         else
-            names(k) = right(j)
-            j = j + 1
-         end if
-      end do
-   end subroutine sort_names
 
    !> Write a file that is there whole or not at all: temporary name, data to the disk, rename, name to the disk.
    function write_words(path, words) result(failure)
@@ -193,15 +160,9 @@ contains
       integer(c_size_t), intent(in) :: bytes
       character(len=:), allocatable :: failure
       character(len=:), allocatable :: temporary
-      integer(c_int) :: descriptor
 
       temporary = path//'.tmp'
-      descriptor = create_file(temporary)
-      if (descriptor < 0) then
-         failure = last_failure()
-         return
-      end if
-      failure = write_and_close(descriptor, data, bytes)
+      failure = write_and_close(create_file(temporary), data, bytes)
       if (len(failure) == 0) failure = rename_over(temporary, path)
       if (len(failure) == 0) failure = sync_path(parent_directory(path))
    end function write_durably
@@ -215,18 +176,18 @@ contains
 
    !> All bytes, then onto the disk.
    function write_and_close(descriptor, data, bytes) result(failure)
-      integer(c_int), intent(in) :: descriptor
+      integer(c_int), intent(in) :: descriptor !! < 0: the file could not be opened
       type(c_ptr), intent(in) :: data
       integer(c_size_t), intent(in) :: bytes
       character(len=:), allocatable :: failure
       integer(c_int) :: status
 
+      failure = failure_of(descriptor)
+      if (len(failure) > 0) return
       failure = write_all(descriptor, data, bytes)
-      if (len(failure) == 0) then
-         if (posix_fsync(descriptor) /= 0) failure = last_failure()
-      end if
+      if (len(failure) == 0) failure = failure_of(posix_fsync(descriptor))
       status = posix_close(descriptor)
-      if (status /= 0 .and. len(failure) == 0) failure = last_failure()
+      if (len(failure) == 0) failure = failure_of(status)
    end function write_and_close
 
    !> Append a text in one write and put it onto the disk.
@@ -234,19 +195,20 @@ contains
       character(len=*), intent(in) :: path
       character(len=*), intent(in), target :: text
       character(len=:), allocatable :: failure
-      integer(c_int) :: descriptor
+      failure = write_and_close(open_file(path, ior(o_wronly, o_append)), c_loc(text), len(text, kind=c_size_t))
+   end function append_text
 
+   !> Open a file, which is made if it is not there; negative on failure.
+   function open_file(path, flags) result(descriptor)
+      character(len=*), intent(in) :: path
+      integer(c_int), intent(in) :: flags
+      integer(c_int) :: descriptor
       if (path_exists(path)) then
-         descriptor = posix_open(path//c_null_char, ior(o_wronly, o_append))
+         descriptor = posix_open(path//c_null_char, flags)
       else
          descriptor = create_file(path)
       end if
-      if (descriptor < 0) then
-         failure = last_failure()
-         return
-      end if
-      failure = write_and_close(descriptor, c_loc(text), len(text, kind=c_size_t))
-   end function append_text
+   end function open_file
 
    !> Size of a file; -1 if it cannot be read.
    function file_bytes(path) result(bytes)
@@ -326,11 +288,7 @@ contains
       logical :: taken
 
       self%path = path
-      if (path_exists(path)) then
-         self%descriptor = posix_open(path//c_null_char, o_wronly)
-      else
-         self%descriptor = create_file(path)
-      end if
+      self%descriptor = open_file(path, o_wronly)
       if (self%descriptor < 0) then
          call raise(error, path//': cannot be opened: '//last_failure())
          return

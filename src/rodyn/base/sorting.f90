@@ -1,21 +1,41 @@
-!> Order of numbers, or of rows of numbers.
+!> Order of numbers, of columns of numbers, or of texts.
 module rodyn_sorting
    use rodyn_kinds, only: wp
    implicit none (type, external)
    private
    public :: sorted_order
 
+   !> Indices that sort, equal ones in the order in which they stand.
+   interface sorted_order
+      module procedure order_of_columns
+      module procedure order_of_texts
+   end interface sorted_order
+
 contains
 
-   !> Indices that sort the columns of `key` (bottom-up merge sort, stable).
-   pure function sorted_order(key) result(order)
+   !> Indices that sort the columns of `key`.
+   pure function order_of_columns(key) result(order)
       real(wp), intent(in) :: key(:, :)
       integer, allocatable :: order(:)
-      integer, allocatable :: other(:)
-      integer :: n, width, low, middle, high, i, j, m
+      order = order_of(size(key, 2), key=key)
+   end function order_of_columns
 
-      n = size(key, 2)
-      allocate (order(n), other(n))
+   !> Indices that sort texts.
+   pure function order_of_texts(texts) result(order)
+      character(len=*), intent(in) :: texts(:)
+      integer, allocatable :: order(:)
+      order = order_of(size(texts), texts=texts)
+   end function order_of_texts
+
+   !> Bottom-up merge sort, stable.
+   pure function order_of(n, key, texts) result(order)
+      integer, intent(in) :: n
+      real(wp), intent(in), optional :: key(:, :)        !! what is sorted: columns
+      character(len=*), intent(in), optional :: texts(:) !! or texts
+      integer, allocatable :: order(:)
+      integer :: other(n)
+      integer :: width, low, middle, high, i, j, m
+
       order = [(i, i=1, n)]
       width = 1
       do while (width < n)
@@ -25,13 +45,7 @@ contains
             i = low
             j = middle
             do m = low, high - 1
-               if (j >= high) then
-                  other(m) = order(i)
-                  i = i + 1
-               else if (i >= middle) then
-                  other(m) = order(j)
-                  j = j + 1
-               else if (precedes(key(:, order(j)), key(:, order(i)))) then
+               if (takes_second()) then
                   other(m) = order(j)
                   j = j + 1
                else
@@ -40,18 +54,24 @@ contains
                end if
             end do
          end do
-         call swap(order, other)
+         order = other
          width = 2*width
       end do
-   end function sorted_order
 
-   pure subroutine swap(a, b)
-      integer, allocatable, intent(inout) :: a(:), b(:)
-      integer, allocatable :: c(:)
-      call move_alloc(a, c)
-      call move_alloc(b, a)
-      call move_alloc(c, b)
-   end subroutine swap
+   contains
+
+      !> Does the next one come from the second half?
+      pure logical function takes_second()
+         takes_second = i >= middle
+         if (i >= middle .or. j >= high) return
+         if (present(texts)) then
+            takes_second = texts(order(j)) < texts(order(i))
+         else
+            takes_second = precedes(key(:, order(j)), key(:, order(i)))
+         end if
+      end function takes_second
+
+   end function order_of
 
    !> Lexical order of two columns.
    pure logical function precedes(a, b)

@@ -1,5 +1,5 @@
 !> Lines for whoever reads along. A reader who has gone (`rodyn run a.nml | head -1`, a closed terminal) or a full disk costs
-!> the lines, not the run; where lines are the result, `rodyn_posix` has `write_output`, which tells of failures.
+!> the lines, not the run; where lines are the result, `write_text` of `rodyn_posix` returns failures.
 module rodyn_terminal
    use rodyn_posix, only: standard_error, standard_output, write_text
    implicit none (type, external)

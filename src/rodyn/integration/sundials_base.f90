@@ -1,9 +1,9 @@
 !> What CVODE and ARKODE are given and what they return: the callbacks, the text of return codes, the version.
 module rodyn_sundials_base
-   use, intrinsic :: iso_c_binding, only: c_ptr, c_int, c_long, c_double, c_char, c_size_t, &
-      c_f_pointer, c_loc, c_associated
+   use, intrinsic :: iso_c_binding, only: c_ptr, c_int, c_long, c_double, c_char, c_f_pointer, c_loc, c_associated
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type, raise
+   use rodyn_posix, only: c_text
    use rodyn_text, only: time_text
    use rodyn_ode, only: ode_system, n_quadratures
    use rodyn_nvector, only: vector_content, content_of
@@ -30,27 +30,24 @@ module rodyn_sundials_base
    real(wp), parameter :: no_weight = 1.0e-100_wp
 
    interface
-      function get_version(version, length) result(flag) bind(c, name='SUNDIALSGetVersion')
+      integer(c_int) function get_version(version, length) bind(c, name='SUNDIALSGetVersion')
          import :: c_int, c_char
          implicit none (type, external)
          character(kind=c_char), intent(out) :: version(*)
          integer(c_int), intent(in), value :: length
-         integer(c_int) :: flag
       end function get_version
 
       !> Names of return codes. The caller frees the text; the Fortran interfaces of SUNDIALS would lose it.
-      function cvode_flag_name(flag) result(text) bind(c, name='CVodeGetReturnFlagName')
+      type(c_ptr) function cvode_flag_name(flag) bind(c, name='CVodeGetReturnFlagName')
          import :: c_ptr, c_long
          implicit none (type, external)
          integer(c_long), intent(in), value :: flag
-         type(c_ptr) :: text
       end function cvode_flag_name
 
-      function erkstep_flag_name(flag) result(text) bind(c, name='ERKStepGetReturnFlagName')
+      type(c_ptr) function erkstep_flag_name(flag) bind(c, name='ERKStepGetReturnFlagName')
          import :: c_ptr, c_long
          implicit none (type, external)
          integer(c_long), intent(in), value :: flag
-         type(c_ptr) :: text
       end function erkstep_flag_name
 
       !> The C library's free.
@@ -59,13 +56,6 @@ module rodyn_sundials_base
          implicit none (type, external)
          type(c_ptr), intent(in), value :: address
       end subroutine c_release
-
-      function c_length(text) result(n) bind(c, name='strlen')
-         import :: c_ptr, c_size_t
-         implicit none (type, external)
-         type(c_ptr), intent(in), value :: text
-         integer(c_size_t) :: n
-      end function c_length
    end interface
 
 contains
@@ -189,22 +179,6 @@ contains
       call raise(error, call_name//place//': '//failure_text(flag)//' ('//c_text(name)//')')
       if (c_associated(name)) call c_release(name)
    end subroutine check
-
-   !> A C string as text; empty for a null pointer.
-   function c_text(address) result(text)
-      type(c_ptr), intent(in) :: address
-      character(len=:), allocatable :: text
-      character(kind=c_char), pointer :: characters(:)
-      integer :: i, n
-
-      text = ''
-      if (.not. c_associated(address)) return
-      n = int(c_length(address))
-      call c_f_pointer(address, characters, [n])
-      do i = 1, n
-         text = text//characters(i)
-      end do
-   end function c_text
 
    !> The version of the SUNDIALS library in use, like '6.4.1'.
    function sundials_version() result(text)

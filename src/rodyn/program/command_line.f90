@@ -9,7 +9,7 @@ module rodyn_command_line
    use rodyn_modal_analysis, only: analyse_modes
    use rodyn_posix_files, only: stop_signals, watch_signals
    use rodyn_run, only: check_steps, run_case
-   use rodyn_posix, only: ignore_signal, same_path, sigpipe, write_output
+   use rodyn_posix, only: ignore_signal, same_path, sigpipe, standard_output, write_text
    use rodyn_resources, only: ensure_stack
    use rodyn_scene, only: scene_type, compile_scene
    use rodyn_sweep_config, only: sweep_config
@@ -108,7 +108,7 @@ contains
       character(len=*), intent(in) :: text !! without the closing newline
       type(error_type), allocatable, intent(inout) :: error
       character(len=:), allocatable :: failure
-      failure = write_output(text//nl)
+      failure = write_text(standard_output, text//nl)
       if (len(failure) > 0) call raise(error, 'rodyn: standard output cannot be written: '//failure)
    end subroutine print_text
 

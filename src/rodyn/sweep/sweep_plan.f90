@@ -2,11 +2,12 @@
 !>
 !> Nothing is stored per case, so that a million of them cost nothing. Cases count from 1.
 module rodyn_sweep_plan
-   use rodyn_kinds, only: i8
+   use rodyn_kinds, only: i8, wp
    use rodyn_build_info, only: compiler, compiler_options, git_commit, program_version
    use rodyn_case_config, only: case_config
    use rodyn_case_reader, only: resolved_case
    use rodyn_errors, only: error_type, raise, exit_bad_input
+   use rodyn_sorting, only: sorted_order
    use rodyn_sweep_config, only: sweep_axis, sweep_config, axis_size, value_text
    use rodyn_text, only: to_text
    use rodyn_text_buffer, only: text_buffer
@@ -61,74 +62,42 @@ contains
       type(sweep_axis), intent(in) :: axes(:)
       integer, intent(in) :: d
       integer, allocatable :: order(:)
-      integer :: i
+      real(wp), allocatable :: key(:, :) !! values of the axes (axes, length)
+      integer :: a, i
 
-      do i = 1, size(axes)
-         if (axes(i)%dimension == d) dimension%length = axis_size(axes(i))
+      dimension%length = axis_size(axes(findloc(axes%dimension, d, dim=1)))
+      allocate (key(size(axes), dimension%length), source=0.0_wp)
+      do a = 1, size(axes)
+         if (axes(a)%dimension == d) key(a, :) = numbers_of(axes(a))
       end do
-      order = [(i, i=1, dimension%length)]
-      call sort_rows(order, axes, d)
-      allocate (dimension%first_equal(dimension%length))
+      order = sorted_order(key)
+      dimension%first_equal = order
       do i = 1, dimension%length
          dimension%first_equal(order(i)) = order(i)
          if (i == 1) cycle
-         if (compare(axes, d, order(i - 1), order(i)) == 0) &
+         if (.not. any(abs(key(:, order(i)) - key(:, order(i - 1))) > 0.0_wp)) &
             dimension%first_equal(order(i)) = dimension%first_equal(order(i - 1))
       end do
    end subroutine new_dimension
 
-   !> Order rows by their values, equal ones by number: merge sort.
-   recursive subroutine sort_rows(order, axes, d)
-      integer, intent(inout) :: order(:)
-      type(sweep_axis), intent(in) :: axes(:)
-      integer, intent(in) :: d
-      integer, allocatable :: left(:), right(:)
-      integer :: half, i, j, k
-
-      if (size(order) < 2) return
-      half = size(order)/2
-      left = order(:half)
-      right = order(half + 1:)
-      call sort_rows(left, axes, d)
-      call sort_rows(right, axes, d)
-      i = 1
-      j = 1
-      do k = 1, size(order)
-         if (j > size(right)) then
-            order(k) = left(i)
-            i = i + 1
-         else if (i > size(left)) then
-            order(k) = right(j)
-            j = j + 1
-         else if (compare(axes, d, left(i), right(j)) <= 0) then
-            order(k) = left(i)
-            i = i + 1
-         else
-            order(k) = right(j)
-            j = j + 1
-         end if
-      end do
-   end subroutine sort_rows
-
-   !> -1, 0 or 1: order of the values of two rows.
-   pure integer function compare(axes, d, row, other)
-      type(sweep_axis), intent(in) :: axes(:)
-      integer, intent(in) :: d, row, other
+   !> The values of an axis; for texts, numbers that differ where these do.
+   pure function numbers_of(axis) result(numbers)
+      type(sweep_axis), intent(in) :: axis
+      real(wp) :: numbers(axis_size(axis))
+      integer, allocatable :: order(:)
       integer :: i
 
-      compare = 0
-      do i = 1, size(axes)
-         if (axes(i)%dimension /= d) cycle
-         if (axes(i)%textual) then
-            if (axes(i)%texts(row) < axes(i)%texts(other)) compare = -1
-            if (axes(i)%texts(row) > axes(i)%texts(other)) compare = 1
-         else
-            if (axes(i)%numbers(row) < axes(i)%numbers(other)) compare = -1
-            if (axes(i)%numbers(row) > axes(i)%numbers(other)) compare = 1
-         end if
-         if (compare /= 0) return
+      if (.not. axis%textual) then
+         numbers = axis%numbers
+         return
+      end if
+      order = sorted_order(axis%texts)
+      do i = 1, size(order)
+         numbers(order(i)) = i
+         if (i == 1) cycle
+         if (axis%texts(order(i)) == axis%texts(order(i - 1))) numbers(order(i)) = numbers(order(i - 1))
       end do
-   end function compare
+   end function numbers_of
 
    !> Row of each dimension in a case; the last dimension runs fastest.
    pure function rows(self, case) result(at)
