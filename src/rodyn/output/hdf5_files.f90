@@ -4,10 +4,9 @@
 !> own lives longer than a call. Shapes are Fortran's: `(rod, time)` here is `(time, rod)` in C and Python.
 !> Files are readable by HDF5 1.8 and later and carry no time stamps: equal contents are equal bytes.
 !> A failed library call becomes a message with the call, the object, the path and the library's own reason. A failure in writing
-!> is kept: whatever is to be written after it is not, and `tell`, `flush` and `close` tell of it.
+!> is kept: whatever is to be written after it is not, and `get_failure`, `flush` and `close` return it.
 module rodyn_hdf5_files
-   use, intrinsic :: iso_c_binding, only: c_associated, c_bool, c_char, c_f_pointer, c_funloc, c_funptr, c_int, c_int64_t, c_loc, &
-      c_ptr, c_size_t
+   use, intrinsic :: iso_c_binding, only: c_bool, c_char, c_f_pointer, c_funloc, c_funptr, c_int, c_int64_t, c_loc, c_ptr
    use, intrinsic :: iso_fortran_env, only: int32, int64
    use hdf5, only: hid_t, hsize_t, size_t, h5dont_atexit_f, h5open_f, h5get_libversion_f, h5eset_auto_f, &
       h5fcreate_f, h5fopen_f, h5fclose_f, h5fflush_f, h5f_acc_excl_f, h5f_acc_rdonly_f, h5f_close_strong_f, &
@@ -15,7 +14,7 @@ module rodyn_hdf5_files
       h5pcreate_f, h5pclose_f, h5p_file_access_f, h5p_file_create_f, h5p_group_create_f, h5p_dataset_create_f, &
       h5pset_fclose_degree_f, h5pset_libver_bounds_f, h5pset_obj_track_times_f, h5pset_chunk_f, &
       h5pset_shuffle_f, h5pset_deflate_f, h5pset_fletcher32_f, &
-      h5gcreate_f, h5gclose_f, h5gget_info_by_name_f, h5lexists_f, h5lget_name_by_idx_f, h5_index_name_f, h5_iter_inc_f, &
+      h5gcreate_f, h5gclose_f, &
       h5screate_f, h5screate_simple_f, h5sclose_f, h5s_scalar_f, h5s_unlimited_f, h5s_select_set_f, &
       h5sselect_hyperslab_f, h5sget_simple_extent_ndims_f, h5sget_simple_extent_dims_f, &
       h5sget_simple_extent_npoints_f, &
@@ -30,12 +29,13 @@ module rodyn_hdf5_files
    use h5ds, only: h5dsset_scale_f, h5dsattach_scale_f
    use rodyn_errors, only: error_type, raise
    use rodyn_kinds, only: wp
+   use rodyn_posix, only: c_text
    implicit none (type, external)
    private
    public :: hdf5_file, hdf5_version
 
    integer, parameter :: max_rank = 7
-   integer, parameter :: name_length = 256 !! longest member name `members` returns whole
+   integer, parameter :: longest_reason = 512 !! of the library's failures [bytes]
    integer(size_t), parameter :: longest_text = 256*1024*1024 !! of an attribute [bytes]
 
    !> An open file. Leaving the scope closes it, silently: call `close` to hear of failures.
@@ -49,29 +49,24 @@ module rodyn_hdf5_files
       procedure :: is_open
       procedure :: flush => flush_file
       procedure :: close => close_file
-      procedure :: tell
+      procedure :: get_failure
       procedure :: create_group
       procedure :: create_series
       procedure :: create_texts
-      generic :: append => append_1, append_2, append_3, append_int64, append_texts
-      generic :: write => write_integer_1, write_real_1, write_real_2, write_real_3
+      generic :: append => append_reals, append_int64, append_texts
+      generic :: write => write_integers, write_reals
       procedure :: make_scale
       procedure :: attach_scale
       generic :: put_attribute => put_text, put_real, put_int32, put_int64, put_logical
-      procedure :: exists
       procedure :: has_attribute
-      procedure :: members
-      procedure :: get_shape
-      generic :: read => read_integer_1, read_real_1, read_real_2, read_real_3
-      generic :: get_attribute => get_text, get_real, get_int32, get_int64, get_logical
+      generic :: get_attribute => get_text, get_real
       procedure, private :: failed
       procedure, private :: note
       procedure, private :: fails
-      procedure, private :: append_1, append_2, append_3, append_int64, append_texts, append_block
-      procedure, private :: write_integer_1, write_real_1, write_real_2, write_real_3, write_whole
+      procedure, private :: append_reals, append_int64, append_texts, append_block
+      procedure, private :: write_integers, write_reals, write_whole
       procedure, private :: put_text, put_real, put_int32, put_int64, put_logical, put_number
-      procedure, private :: read_integer_1, read_real_1, read_real_2, read_real_3, read_whole
-      procedure, private :: get_text, get_real, get_int32, get_int64, get_logical, get_number
+      procedure, private :: get_text, get_real
       final :: finalize
    end type hdf5_file
 
@@ -88,32 +83,23 @@ module rodyn_hdf5_files
 
    interface
       ! The Fortran interface can only print the error stack; the reason is wanted as text.
-      function h5ewalk2(stack, direction, callback, client_data) result(status) bind(c, name='H5Ewalk2')
+      integer(c_int) function h5ewalk2(stack, direction, callback, client_data) bind(c, name='H5Ewalk2')
          import :: c_funptr, c_int, c_int64_t, c_ptr
          implicit none (type, external)
          integer(c_int64_t), value :: stack
          integer(c_int), value :: direction
          type(c_funptr), value :: callback
          type(c_ptr), value :: client_data
-         integer(c_int) :: status
       end function h5ewalk2
 
       ! not in the Fortran interface of HDF5 1.10
-      function h5pset_file_locking(access_list, use_locks, ignore_when_disabled) result(status) &
+      integer(c_int) function h5pset_file_locking(access_list, use_locks, ignore_when_disabled) &
          bind(c, name='H5Pset_file_locking')
          import :: c_bool, c_int, c_int64_t
          implicit none (type, external)
          integer(c_int64_t), value :: access_list
          logical(c_bool), value :: use_locks, ignore_when_disabled
-         integer(c_int) :: status
       end function h5pset_file_locking
-
-      function c_strlen(text) result(length) bind(c, name='strlen')
-         import :: c_ptr, c_size_t
-         implicit none (type, external)
-         type(c_ptr), value :: text
-         integer(c_size_t) :: length
-      end function c_strlen
    end interface
 
 contains
@@ -182,7 +168,7 @@ contains
          call h5fflush_f(self%id, h5f_scope_local_f, status)
          call self%note(status, 'h5fflush_f', '/')
       end if
-      call self%tell(error)
+      call self%get_failure(error)
    end subroutine flush_file
 
    !> Close the file and whatever of it is still open; nothing happens if it is closed already.
@@ -199,11 +185,11 @@ contains
    end subroutine close_file
 
    !> The first failure in writing, if there was one.
-   subroutine tell(self, error)
+   subroutine get_failure(self, error)
       class(hdf5_file), intent(in) :: self
       type(error_type), allocatable, intent(out) :: error
       if (allocated(self%error)) error = self%error
-   end subroutine tell
+   end subroutine get_failure
 
    impure elemental subroutine finalize(self)
       type(hdf5_file), intent(inout) :: self
@@ -273,39 +259,19 @@ contains
       call self%note(status, 'h5dclose_f', name)
    end subroutine new_series
 
-   !> Append numbers, one per time, to a series.
-   subroutine append_1(self, name, values)
+   !> Append rows to a series: numbers, one per time, or arrays, whose last dimension is time.
+   subroutine append_reals(self, name, values)
       class(hdf5_file), intent(inout) :: self
       character(len=*), intent(in) :: name
-      real(wp), intent(in), contiguous, target :: values(:) !! (time)
-      if (size(values) == 0) return
-      call self%append_block(name, h5t_native_double, c_loc(values), int(shape(values), hsize_t))
-   end subroutine append_1
-
-   !> Append rows to a series.
-   subroutine append_2(self, name, values)
-      class(hdf5_file), intent(inout) :: self
-      character(len=*), intent(in) :: name
-      real(wp), intent(in), contiguous, target :: values(:, :) !! (rod, time)
-      if (size(values) == 0) return
-      call self%append_block(name, h5t_native_double, c_loc(values), int(shape(values), hsize_t))
-   end subroutine append_2
-
-   !> Append tables to a series.
-   subroutine append_3(self, name, values)
-      class(hdf5_file), intent(inout) :: self
-      character(len=*), intent(in) :: name
-      real(wp), intent(in), contiguous, target :: values(:, :, :)
-      if (size(values) == 0) return
-      call self%append_block(name, h5t_native_double, c_loc(values), int(shape(values), hsize_t))
-   end subroutine append_3
+      real(wp), intent(in), contiguous, target :: values(..)
+      call self%append_block(name, h5t_native_double, c_loc(values), extent_of(values))
+   end subroutine append_reals
 
    !> Append whole numbers to a series of integers.
    subroutine append_int64(self, name, values)
       class(hdf5_file), intent(inout) :: self
       character(len=*), intent(in) :: name
       integer(int64), intent(in), contiguous, target :: values(:)
-      if (size(values) == 0) return
       call self%append_block(name, h5kind_to_type(int64, h5_integer_kind), c_loc(values), int(shape(values), hsize_t))
    end subroutine append_int64
 
@@ -350,7 +316,7 @@ contains
       integer(hsize_t) :: extent(max_rank), most(max_rank), start(size(counts))
       integer :: rank, status
 
-      if (allocated(self%error)) return
+      if (allocated(self%error) .or. any(counts == 0)) return
       rank = size(counts)
       call h5dopen_f(self%id, name, set, status)
       if (self%fails(status, 'h5dopen_f', name)) return
@@ -377,41 +343,29 @@ contains
    end subroutine append_block
 
    !> Write a whole data set of fixed shape, as one chunk with checksum.
-   subroutine write_integer_1(self, name, values, compression)
+   subroutine write_integers(self, name, values, compression)
       class(hdf5_file), intent(inout) :: self
       character(len=*), intent(in) :: name
       integer, intent(in), contiguous, target :: values(:)
       integer, intent(in) :: compression !! gzip level, 0..9
       call self%write_whole(name, h5t_std_i32le, h5kind_to_type(kind(values), h5_integer_kind), c_loc(values), &
          int(shape(values), hsize_t), compression)
-   end subroutine write_integer_1
+   end subroutine write_integers
 
-   subroutine write_real_1(self, name, values, compression)
+   subroutine write_reals(self, name, values, compression)
       class(hdf5_file), intent(inout) :: self
       character(len=*), intent(in) :: name
-      real(wp), intent(in), contiguous, target :: values(:)
+      real(wp), intent(in), contiguous, target :: values(..)
       integer, intent(in) :: compression !! gzip level, 0..9
-      call self%write_whole(name, h5t_ieee_f64le, h5t_native_double, c_loc(values), int(shape(values), hsize_t), &
-         compression)
-   end subroutine write_real_1
+      call self%write_whole(name, h5t_ieee_f64le, h5t_native_double, c_loc(values), extent_of(values), compression)
+   end subroutine write_reals
 
-   subroutine write_real_2(self, name, values, compression)
-      class(hdf5_file), intent(inout) :: self
-      character(len=*), intent(in) :: name
-      real(wp), intent(in), contiguous, target :: values(:, :)
-      integer, intent(in) :: compression !! gzip level, 0..9
-      call self%write_whole(name, h5t_ieee_f64le, h5t_native_double, c_loc(values), int(shape(values), hsize_t), &
-         compression)
-   end subroutine write_real_2
-
-   subroutine write_real_3(self, name, values, compression)
-      class(hdf5_file), intent(inout) :: self
-      character(len=*), intent(in) :: name
-      real(wp), intent(in), contiguous, target :: values(:, :, :)
-      integer, intent(in) :: compression !! gzip level, 0..9
-      call self%write_whole(name, h5t_ieee_f64le, h5t_native_double, c_loc(values), int(shape(values), hsize_t), &
-         compression)
-   end subroutine write_real_3
+   !> The shape of an array. (That of an empty one of any rank is negative in gfortran 12.)
+   pure function extent_of(values) result(extent)
+      real(wp), intent(in) :: values(..)
+      integer(hsize_t), allocatable :: extent(:)
+      extent = max(0, shape(values))
+   end function extent_of
 
    subroutine write_whole(self, name, file_type, memory_type, values, extent, compression)
       class(hdf5_file), intent(inout) :: self
@@ -493,23 +447,19 @@ contains
       character(len=*), intent(in) :: name
       integer, intent(in) :: dimension      !! 1: the first of the Fortran array
       character(len=*), intent(in) :: scale !! data set after `make_scale`
-      type(error_type), allocatable :: error
-      integer(int64), allocatable :: extent(:)
-      integer(hid_t) :: set, scale_set
-      integer :: status
+      integer(hid_t) :: set, scale_set, space
+      integer :: rank, status
 
       if (allocated(self%error)) return
-      call self%get_shape(name, extent, error)
-      if (allocated(error)) then
-         call move_alloc(error, self%error)
-         return
-      end if
       call h5dopen_f(self%id, name, set, status)
       if (self%fails(status, 'h5dopen_f', name)) return
       call h5dopen_f(self%id, scale, scale_set, status)
       if (.not. self%fails(status, 'h5dopen_f', scale)) then
+         call h5dget_space_f(set, space, status)
+         call h5sget_simple_extent_ndims_f(space, rank, status)
+         call h5sclose_f(space, status)
          ! unlike the rest of the Fortran interface, this call counts dimensions (from 1) in C order
-         call h5dsattach_scale_f(set, scale_set, size(extent) - dimension + 1, status)
+         call h5dsattach_scale_f(set, scale_set, rank - dimension + 1, status)
          call self%note(status, 'h5dsattach_scale_f', name//' to '//scale)
          call h5dclose_f(scale_set, status)
       end if
@@ -610,17 +560,6 @@ contains
       call h5sclose_f(space, status)
    end subroutine new_attribute
 
-   !> Does a group or data set of this name exist? Groups on the way to it must exist.
-   function exists(self, name)
-      class(hdf5_file), intent(in) :: self
-      character(len=*), intent(in) :: name
-      logical :: exists
-      integer :: status
-
-      call h5lexists_f(self%id, name, exists, status)
-      if (status /= 0) exists = .false.
-   end function exists
-
    !> Does an object have an attribute of this name?
    function has_attribute(self, object, name)
       class(hdf5_file), intent(in) :: self
@@ -632,135 +571,6 @@ contains
       call h5aexists_by_name_f(self%id, object, name, has_attribute, status)
       if (status /= 0) has_attribute = .false.
    end function has_attribute
-
-   !> Names of the groups and data sets in a group, sorted.
-   subroutine members(self, group, names, error)
-      class(hdf5_file), intent(in) :: self
-      character(len=*), intent(in) :: group !! '/' for the root
-      character(len=name_length), allocatable, intent(out) :: names(:)
-      type(error_type), allocatable, intent(out) :: error
-      integer :: storage_type, n_links, max_order, i, status
-
-      call h5gget_info_by_name_f(self%id, group, storage_type, n_links, max_order, status)
-      if (self%failed(status, 'h5gget_info_by_name_f', group, error)) return
-      allocate (names(n_links))
-      do i = 1, n_links
-         call h5lget_name_by_idx_f(self%id, group, h5_index_name_f, h5_iter_inc_f, int(i - 1, hsize_t), names(i), status)
-         if (self%failed(status, 'h5lget_name_by_idx_f', group, error)) return
-      end do
-   end subroutine members
-
-   !> Shape of a data set as a Fortran array.
-   subroutine get_shape(self, name, extent, error)
-      class(hdf5_file), intent(in) :: self
-      character(len=*), intent(in) :: name
-      integer(int64), allocatable, intent(out) :: extent(:) !! empty for a scalar
-      type(error_type), allocatable, intent(out) :: error
-      integer(hid_t) :: set, space
-      integer(hsize_t) :: sizes(max_rank), most(max_rank)
-      integer :: rank, status
-
-      call h5dopen_f(self%id, name, set, status)
-      if (self%failed(status, 'h5dopen_f', name, error)) return
-      call h5dget_space_f(set, space, status)
-      if (.not. self%failed(status, 'h5dget_space_f', name, error)) then
-         call h5sget_simple_extent_ndims_f(space, rank, status)
-         if (rank > max_rank) then
-            call raise(error, "'"//name//"' of "//self%path//': more dimensions than this program handles')
-         else
-            call h5sget_simple_extent_dims_f(space, sizes, most, status)
-            extent = int(sizes(:rank), int64)
-         end if
-         call h5sclose_f(space, status)
-      end if
-      call h5dclose_f(set, status)
-   end subroutine get_shape
-
-   !> Read a whole data set. Its rank must be that of `values`; its type is converted.
-   subroutine read_integer_1(self, name, values, error)
-      class(hdf5_file), intent(in) :: self
-      character(len=*), intent(in) :: name
-      integer, allocatable, target, intent(out) :: values(:)
-      type(error_type), allocatable, intent(out) :: error
-      integer(int64), allocatable :: extent(:)
-
-      call shape_of_rank(self, name, 1, extent, error)
-      if (allocated(error)) return
-      allocate (values(extent(1)))
-      if (size(values) > 0) call self%read_whole(name, h5kind_to_type(kind(values), h5_integer_kind), c_loc(values), error)
-   end subroutine read_integer_1
-
-   subroutine read_real_1(self, name, values, error)
-      class(hdf5_file), intent(in) :: self
-      character(len=*), intent(in) :: name
-      real(wp), allocatable, target, intent(out) :: values(:)
-      type(error_type), allocatable, intent(out) :: error
-      integer(int64), allocatable :: extent(:)
-
-      call shape_of_rank(self, name, 1, extent, error)
-      if (allocated(error)) return
-      allocate (values(extent(1)))
-      if (size(values) > 0) call self%read_whole(name, h5t_native_double, c_loc(values), error)
-   end subroutine read_real_1
-
-   subroutine read_real_2(self, name, values, error)
-      class(hdf5_file), intent(in) :: self
-      character(len=*), intent(in) :: name
-      real(wp), allocatable, target, intent(out) :: values(:, :)
-      type(error_type), allocatable, intent(out) :: error
-      integer(int64), allocatable :: extent(:)
-
-      call shape_of_rank(self, name, 2, extent, error)
-      if (allocated(error)) return
-      allocate (values(extent(1), extent(2)))
-      if (size(values) > 0) call self%read_whole(name, h5t_native_double, c_loc(values), error)
-   end subroutine read_real_2
-
-   subroutine read_real_3(self, name, values, error)
-      class(hdf5_file), intent(in) :: self
-      character(len=*), intent(in) :: name
-      real(wp), allocatable, target, intent(out) :: values(:, :, :)
-      type(error_type), allocatable, intent(out) :: error
-      integer(int64), allocatable :: extent(:)
-
-      call shape_of_rank(self, name, 3, extent, error)
-      if (allocated(error)) return
-      allocate (values(extent(1), extent(2), extent(3)))
-      if (size(values) > 0) call self%read_whole(name, h5t_native_double, c_loc(values), error)
-   end subroutine read_real_3
-
-   subroutine shape_of_rank(self, name, rank, extent, error)
-      class(hdf5_file), intent(in) :: self
-      character(len=*), intent(in) :: name
-      integer, intent(in) :: rank
-      integer(int64), allocatable, intent(out) :: extent(:) !! (rank)
-      type(error_type), allocatable, intent(out) :: error
-      character(len=60) :: numbers
-
-      call self%get_shape(name, extent, error)
-      if (allocated(error)) return
-      if (size(extent) == rank) return
-      write (numbers, '(": ", i0, " dimension(s), expected ", i0)') size(extent), rank
-      call raise(error, "'"//name//"' of "//self%path//trim(numbers))
-   end subroutine shape_of_rank
-
-   subroutine read_whole(self, name, memory_type, values, error)
-      class(hdf5_file), intent(in) :: self
-      character(len=*), intent(in) :: name
-      integer(hid_t), intent(in) :: memory_type
-      type(c_ptr), intent(in) :: values
-      type(error_type), allocatable, intent(out) :: error
-      type(c_ptr) :: buffer
-      integer(hid_t) :: set
-      integer :: status
-
-      buffer = values
-      call h5dopen_f(self%id, name, set, status)
-      if (self%failed(status, 'h5dopen_f', name, error)) return
-      call h5dread_f(set, memory_type, buffer, status)
-      if (self%failed(status, 'h5dread_f', name, error)) continue
-      call h5dclose_f(set, status)
-   end subroutine read_whole
 
    !> Read a text attribute, scalar and of fixed length, without its padding nulls.
    subroutine get_text(self, object, name, value, error)
@@ -823,56 +633,18 @@ contains
       character(len=*), intent(in) :: object, name
       real(wp), target, intent(out) :: value
       type(error_type), allocatable, intent(out) :: error
-      value = 0.0_wp
-      call self%get_number(object, name, h5t_native_double, c_loc(value), error)
-   end subroutine get_real
-
-   subroutine get_int32(self, object, name, value, error)
-      class(hdf5_file), intent(in) :: self
-      character(len=*), intent(in) :: object, name
-      integer(int32), target, intent(out) :: value
-      type(error_type), allocatable, intent(out) :: error
-      value = 0_int32
-      call self%get_number(object, name, h5kind_to_type(int32, h5_integer_kind), c_loc(value), error)
-   end subroutine get_int32
-
-   subroutine get_int64(self, object, name, value, error)
-      class(hdf5_file), intent(in) :: self
-      character(len=*), intent(in) :: object, name
-      integer(int64), target, intent(out) :: value
-      type(error_type), allocatable, intent(out) :: error
-      value = 0_int64
-      call self%get_number(object, name, h5kind_to_type(int64, h5_integer_kind), c_loc(value), error)
-   end subroutine get_int64
-
-   !> Read a logical that was written as an integer; anything but 0 is true.
-   subroutine get_logical(self, object, name, value, error)
-      class(hdf5_file), intent(in) :: self
-      character(len=*), intent(in) :: object, name
-      logical, intent(out) :: value
-      type(error_type), allocatable, intent(out) :: error
-      integer(int32) :: number
-      call self%get_int32(object, name, number, error)
-      value = number /= 0_int32
-   end subroutine get_logical
-
-   subroutine get_number(self, object, name, memory_type, value, error)
-      class(hdf5_file), intent(in) :: self
-      character(len=*), intent(in) :: object, name
-      integer(hid_t), intent(in) :: memory_type
-      type(c_ptr), intent(in) :: value
-      type(error_type), allocatable, intent(out) :: error
       type(c_ptr) :: buffer
       integer(hid_t) :: attribute
       integer :: status
 
-      buffer = value
+      value = 0.0_wp
+      buffer = c_loc(value)
       call h5aopen_by_name_f(self%id, object, name, attribute, status)
       if (self%failed(status, 'h5aopen_by_name_f', object//'@'//name, error)) return
-      call h5aread_f(attribute, memory_type, buffer, status)
+      call h5aread_f(attribute, h5t_native_double, buffer, status)
       if (self%failed(status, 'h5aread_f', object//'@'//name, error)) continue
       call h5aclose_f(attribute, status)
-   end subroutine get_number
+   end subroutine get_real
 
    !> Start the library once and keep it from printing; its reasons go into our messages. Nor does it clean up
    !> when the program ends: all files are closed by then, except one that could not be (full disk), on which
@@ -940,7 +712,7 @@ contains
    function library_reason() result(text)
       character(len=:), allocatable :: text
       character(len=*), parameter :: mark = "error message = '"
-      character(kind=c_char, len=512), target :: buffer
+      character(kind=c_char, len=longest_reason), target :: buffer
       integer(c_int) :: status
       integer :: first, length
       logical :: no_lock
@@ -964,17 +736,13 @@ contains
    function keep_first_record(position, record, client_data) result(stop_here) bind(c)
       integer(c_int), value :: position        !! 0 for the innermost
       type(error_record), intent(in) :: record
-      type(c_ptr), value :: client_data        !! character(len=512)
+      type(c_ptr), value :: client_data        !! character(len=longest_reason)
       integer(c_int) :: stop_here
-      character(kind=c_char), pointer :: from(:), to(:)
-      integer :: length
+      character(kind=c_char, len=longest_reason), pointer :: text
 
       stop_here = 1_c_int
-      if (position > 0 .or. .not. c_associated(record%description)) return
-      length = int(min(c_strlen(record%description), 512_c_size_t))
-      call c_f_pointer(record%description, from, [length])
-      call c_f_pointer(client_data, to, [length])
-      to = from
+      call c_f_pointer(client_data, text)
+      if (position == 0) text = c_text(record%description)
    end function keep_first_record
 
 end module rodyn_hdf5_files

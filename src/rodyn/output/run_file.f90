@@ -8,7 +8,7 @@
 !> Until `finish`, the file has a temporary name (`rodyn_result_file`) under which it may be read: rows are in it a block at
 !> a time, and where that takes long after a minute at the latest. Where they find no room, `append` fails, and `finish` ends
 !> the file as a failed one with the rows that did. A failed file replaces no other than a failed one (`force`). After a failure
-!> within HDF5 the file is left as it is, and every later call tells of that failure again, so that the caller may end its work in
+!> within HDF5 the file is left as it is, and every later call returns that failure again, so that the caller may end its work in
 !> the usual way.
 module rodyn_run_file
    use rodyn_build_info, only: git_commit
@@ -107,7 +107,7 @@ contains
       character(len=*), intent(in) :: path
       logical, intent(in) :: alike !! runs of equal input are equal
       logical, intent(out) :: earlier
-      type(error_type), allocatable :: unwritten !! `finish` tells of it
+      type(error_type), allocatable :: unwritten !! returned by `finish`
       logical :: same
       real(wp) :: t_earlier
       integer :: i
@@ -252,7 +252,7 @@ contains
       if (allocated(error)) return
       call self%write_waiting_rows(error)
       if (.not. self%file%is_open()) return
-      if (allocated(error)) deallocate (error) ! no room, which `finish` tells
+      if (allocated(error)) deallocate (error) ! no room, which `finish` reports
       failure = self%reserve(bytes_at_end + size(names)*(bytes_of_layout + bytes_of_node) + size(time)*bytes_per_event)
       if (len(failure) > 0) then
          if (.not. allocated(self%no_room)) self%no_room = 'events cannot be written: '//failure
@@ -269,7 +269,7 @@ contains
          call self%describe(trim(names(i)), trim(units(i)), trim(meanings(i)))
          if (i > 1) call self%file%attach_scale(trim(names(i)), 1, 'events/time')
       end do
-      call self%file%tell(error)
+      call self%file%get_failure(error)
       if (allocated(error)) call self%give_up(error)
    end subroutine write_events
 

@@ -92,7 +92,7 @@ contains
       call new_block(block, kept, shape, block_cases, message_length)
       do first = 1, plan%n_cases, block_cases
          n = min(block_cases, plan%n_cases - first + 1)
-         call file%tell(error)
+         call file%get_failure(error)
          if (.not. allocated(error)) call fill_block(block, kept, plan, shape, index, first, n, error)
          if (allocated(error)) return
          call append_block(file, block, shape)
