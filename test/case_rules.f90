@@ -15,7 +15,8 @@ contains
       suite = [ &
          new_test('dynamic bending with lumped inertia is refused', dynamic_lumped), &
          new_test('lumped inertia with the default bending is refused', default_lumped), &
-         new_test('quasistatic bending with distributed inertia is refused', quasistatic_distributed), &
+         new_test('condensed rods take reduced dampers only', condensed_exact), &
+         new_test('condensed rods take no hinges that change their stiffness and no kinks that jerk', condensed_changes), &
          new_test('bent rods at the start are refused unless bending is dynamic', bent_rigid), &
          new_test('a third bending shape needs dynamic bending and five Gauss points', third_shape), &
          new_test('bubbles at the start are refused with two shapes', bubbles_refused), &
@@ -90,14 +91,23 @@ contains
          'inertia = ''lumped''; take ''quasistatic'' or ''rigid''')
    end subroutine default_lumped
 
-   subroutine quasistatic_distributed(error)
+   subroutine condensed_exact(error)
       type(error_type), allocatable, intent(out) :: error
       call expect_faults(error, &
-         valid//'&model bending = ''quasistatic'' /', &
-         'c.nml:3: &model bending = ''quasistatic'': bending = ''quasistatic'' is not '//&
-         'possible with inertia = ''distributed''; take ''dynamic'' or ''rigid'', or inertia '//&
-         '= ''lumped''')
-   end subroutine quasistatic_distributed
+         valid//'&model bending = ''quasistatic'', dampers = ''exact'' /', &
+         'c.nml:3: &model dampers = ''exact'': ''exact'' is not possible with bending = ''quasistatic'' and '//&
+         'inertia = ''distributed''; take ''reduced'', or inertia = ''lumped''')
+   end subroutine condensed_exact
+
+   subroutine condensed_changes(error)
+      type(error_type), allocatable, intent(out) :: error
+      call expect_faults(error, &
+         valid//'&model bending = ''quasistatic'' /'//new_line('a')//&
+         '&hinge hinge = 0, upper_stop = 1, stop_stiffness = 9 / &kink_program hinge = 0, law = ''sine'', value = 1, rate = 1 /', &
+         'c.nml:4: &hinge upper_stop = 1: is not possible with bending = ''quasistatic'' and inertia = ''distributed'''//&
+         new_line('a')//'c.nml:4: &kink_program law = ''sine'': must be ''smooth_step'' or ''table'' with bending = '//&
+         '''quasistatic'' and inertia = ''distributed'': the rate of the kink must not jump')
+   end subroutine condensed_changes
 
    subroutine bent_rigid(error)
       type(error_type), allocatable, intent(out) :: error

@@ -7,6 +7,7 @@ program tester
    use test_case_keys, only: collect_case_keys
    use test_case_reader, only: collect_case_reader
    use test_case_rules, only: collect_case_rules
+   use test_condensed, only: collect_condensed
    use test_gauss, only: collect_gauss
    use test_balance, only: collect_balance
    use test_beams, only: collect_beams
@@ -90,6 +91,7 @@ program tester
    call run('hdf5_files', collect_hdf5_files)
    call run('run_file', collect_run_file)
    call run('article', collect_article)
+   call run('condensed', collect_condensed)
    call run('invariants', collect_invariants)
    call run('ledger', collect_ledger)
    call run('beams', collect_beams)

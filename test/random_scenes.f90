@@ -4,9 +4,10 @@ module test_random_scenes
    use rodyn_case_config, only: case_config, load_config
    implicit none (type, external)
    private
-   public :: random_case, seed_random, uniform, kind_name, n_kinds, allocate_case
+   public :: random_case, seed_random, uniform, kind_name, n_kinds, n_all_kinds, allocate_case
 
    integer, parameter :: n_kinds = 18 !! 7 models on a free and on a fixed spacecraft, and 4 with a third bending shape
+   integer, parameter :: n_all_kinds = n_kinds + 2 !! and condensed rods, which do not take hinges that change their stiffness
    integer, parameter :: with_two_shapes = 14
    integer(i8), parameter :: lehmer_modulus = 2147483647_i8
 
@@ -49,10 +50,15 @@ contains
       if (config%model%bending_shapes == 3) name = name//' with bubbles'
    end function kind_name
 
-   !> Choose the model: 1..n_kinds.
+   !> Choose the model: 1..n_all_kinds.
    subroutine set_kind(config, which)
       type(case_config), intent(inout) :: config
       integer, intent(in) :: which
+      if (which > n_kinds) then
+         config%spacecraft%motion = merge('free ', 'fixed', which == n_kinds + 1)
+         config%model%bending = 'quasistatic'
+         return
+      end if
       if (which > with_two_shapes) then
          config%spacecraft%motion = merge('free ', 'fixed', which <= with_two_shapes + 2)
          config%model%formulation = merge('consistent', 'paper     ', mod(which, 2) == 1)
@@ -98,7 +104,7 @@ contains
       config%title = ''
    end subroutine allocate_case
 
-   !> A random case of kind 1..n_kinds: all rods, nodes and hinges different, loads, damping and kinks or not.
+   !> A random case of kind 1..n_all_kinds: all rods, nodes and hinges different, loads, damping and kinks or not.
    subroutine random_case(config, which, n)
       type(case_config), intent(out) :: config
       integer, intent(in) :: which, n

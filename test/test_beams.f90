@@ -152,7 +152,8 @@ contains
       if (.not. allocated(error)) call new_assembled_system(system, scene, scene%hinges, error)
       if (allocated(error)) return
       m = scene%n_dof
-      call mass_matrix(system, scene, [0.0_wp, spread(0.0_wp, 1, n)], [1.0_wp, spread(1.0_wp, 1, n)], spread(0.0_wp, 1, m))
+      call mass_matrix(system, scene, scene%hinges, [0.0_wp, spread(0.0_wp, 1, n)], [1.0_wp, spread(1.0_wp, 1, n)], &
+                       spread(0.0_wp, 1, m))
       if (scene%dynamic_bending) call use_joint_rotations(scene, stiffness, system)
       ! M x = (1/w^2) K x: the lowest frequencies are the largest eigenvalues and keep their digits.
       call symmetric_eigenvalues(system%m, system%k, inverse, .false., error)

@@ -50,8 +50,9 @@ contains
          text = "&model inertia = 'lumped' /"
          config%model%inertia = 'lumped'
       case (4)
-         text = "&model bending = 'quasistatic' /"
+         text = "&model bending = 'quasistatic', dampers = 'exact' /"
          config%model%bending = 'quasistatic'
+         config%model%dampers = 'exact'
       case (5)
          text = '&model bending_shapes = 4 /'
          config%model%bending_shapes = 4

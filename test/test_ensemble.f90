@@ -13,7 +13,7 @@ module test_ensemble
    use rodyn_ensemble, only: ensemble_member, ensemble_client, run_ensemble
    use rodyn_simulation, only: observer_type, listed_times, simulate
    use test_testing, only: unittest, new_test, check
-   use test_random_scenes, only: random_case, seed_random, kind_name, n_kinds, uniform
+   use test_random_scenes, only: random_case, seed_random, kind_name, n_all_kinds, uniform
    implicit none (type, external)
    private
    public :: collect_ensemble
@@ -223,7 +223,7 @@ contains
       character(len=100) :: text
 
       call seed_random(11)
-      do which = 1, n_kinds
+      do which = 1, n_all_kinds
          call random_list(client, which, 3, 19, found)
          if (.not. found) cycle
          call run_ensemble(client)
@@ -277,7 +277,7 @@ contains
       logical :: found
 
       call seed_random(13)
-      do which = 1, n_kinds
+      do which = 1, n_all_kinds
          call random_list(client, which, 4, 13, found)
          if (.not. found) cycle
          client%options = solver_options(rtol=1.0e-6_wp, atol=1.0e-8_wp)

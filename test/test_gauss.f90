@@ -14,7 +14,7 @@ module test_gauss
    use rodyn_integrator, only: solver_options
    use rodyn_gauss_integrator, only: gauss_integrator, new_gauss_integrator
    use test_testing, only: unittest, new_test, check, check_close
-   use test_random_scenes, only: random_case, seed_random, uniform, kind_name, n_kinds, allocate_case
+   use test_random_scenes, only: random_case, seed_random, uniform, kind_name, n_all_kinds, allocate_case
    use rodyn_case_reader, only: read_case
    use test_trajectories, only: trajectory, integrate
    implicit none (type, external)
@@ -85,7 +85,7 @@ contains
       integer :: which, i
 
       call seed_random(161)
-      do which = 1, n_kinds
+      do which = 1, n_all_kinds
          if (index(kind_name(which), 'exact') > 0) cycle ! joints of their own
          call random_case(config, which, 4)
          config%chain%bending_stiffness = 100.0_wp*config%chain%bending_stiffness

@@ -8,7 +8,7 @@ module test_invariants
    use rodyn_frequencies, only: natural_frequencies
    use test_testing, only: unittest, new_test, check, check_close
    use rodyn_motion, only: motion_type, new_motion, initial_state
-   use test_random_scenes, only: allocate_case, random_case, seed_random, kind_name, n_kinds
+   use test_random_scenes, only: allocate_case, random_case, seed_random, kind_name, n_all_kinds
    use test_trajectories, only: trajectory, integrate
    implicit none (type, external)
    private
@@ -75,7 +75,7 @@ contains
       integer :: which, i
 
       call seed_random(11)
-      do which = 1, n_kinds
+      do which = 1, n_all_kinds
          if (index(kind_name(which), 'paper distributed dynamic') > 0) cycle ! its equations have no energy
          call random_case(config, which, 3)
          config%chain%hinge_damping = 0.5_wp
@@ -119,7 +119,7 @@ contains
       integer :: which
 
       call seed_random(12)
-      do which = 1, n_kinds
+      do which = 1, n_all_kinds
          call random_case(config, which, 3)
          call suit_method(config)
          config%solver%rtol = 1.0e-10_wp
@@ -165,7 +165,7 @@ contains
       integer :: which, i
 
       call seed_random(13)
-      do which = 1, n_kinds
+      do which = 1, n_all_kinds
          call random_case(config, which, 3)
          config%solver%rtol = 1.0e-13_wp
          config%solver%atol = 1.0e-14_wp

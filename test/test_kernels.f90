@@ -6,7 +6,7 @@ module test_kernels
    use rodyn_scene, only: scene_type, new_scene
    use rodyn_motion, only: motion_type, new_motion, initial_state
    use test_testing, only: unittest, new_test
-   use test_random_scenes, only: random_case, seed_random, kind_name, n_kinds
+   use test_random_scenes, only: random_case, seed_random, kind_name, n_all_kinds
    implicit none (type, external)
    private
    public :: collect_kernels
@@ -29,7 +29,7 @@ contains
       call seed_random(1)
       worst = 0.0_wp
       do i = 1, 1000
-         call random_case(config, 1 + mod(i, n_kinds), 1 + mod(i/n_kinds, 9))
+         call random_case(config, 1 + mod(i, n_all_kinds), 1 + mod(i/n_all_kinds, 9))
          call accelerations_by(config, 'recursive', recursive, error)
          if (allocated(error)) return
          call accelerations_by(config, 'assembled', assembled, error)
@@ -39,7 +39,7 @@ contains
          ! With bubbles the recursion is the one that forms its differences as they stand.
          if (.not. difference < merge(1.0e-10_wp, 1.0e-11_wp, config%model%bending_shapes == 3)) then
             write (text, '("scene ", i0, " with ", i0, " rods: relative difference ", es9.2)') i, config%chain%n_rods, difference
-            call raise(error, kind_name(1 + mod(i, n_kinds))//' '//trim(text))
+            call raise(error, kind_name(1 + mod(i, n_all_kinds))//' '//trim(text))
             return
          end if
       end do

@@ -93,7 +93,7 @@ contains
       call new_assembled_system(system, scene, scene%hinges, error)
       if (allocated(error)) return
       associate (phi => q(scene%phi_at() + 1:scene%phi_at() + scene%n))
-         call mass_matrix(system, scene, [0.0_wp, sin(phi)], [1.0_wp, cos(phi)], q)
+         call mass_matrix(system, scene, scene%hinges, [0.0_wp, sin(phi)], [1.0_wp, cos(phi)], q)
       end associate
       m = scene%n_dof
       list = pack([(i, i=0, scene%n - 1)], locked)
@@ -151,7 +151,7 @@ contains
                if (allocated(error)) return
                call new_assembled_system(system, scene, motion%dynamics%hinges, error)
                associate (phi => y(scene%phi_at() + 1:scene%phi_at() + n))
-                  call mass_matrix(system, scene, [0.0_wp, sin(phi)], [1.0_wp, cos(phi)], y(:m))
+                  call mass_matrix(system, scene, scene%hinges, [0.0_wp, sin(phi)], [1.0_wp, cos(phi)], y(:m))
                end associate
                call solve_multipliers(scene, y(:m), locked, matmul(system%m, free), s, a, lambda, error)
                if (allocated(error)) return

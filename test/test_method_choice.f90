@@ -12,7 +12,7 @@ module test_method_choice
    use rodyn_method_choice, only: method_choice, choose_method
    use rodyn_method_costs, only: candidates, effort_of
    use test_testing, only: unittest, new_test, check
-   use test_random_scenes, only: allocate_case, random_case, seed_random, kind_name, n_kinds
+   use test_random_scenes, only: allocate_case, random_case, seed_random, kind_name, n_all_kinds
    implicit none (type, external)
    private
    public :: collect_method_choice
@@ -58,7 +58,7 @@ contains
       scenes = 0
       do seed = 21, 20 + n_seeds
          call seed_random(seed)
-         do which = 1, n_kinds
+         do which = 1, n_all_kinds
             if (index(kind_name(which), 'exact') > 0) cycle ! relaxing hinges have no K and D of their own
             do n = 1, 9
                call random_case(config, which, n)

@@ -12,7 +12,7 @@ module test_modes
    use rodyn_motion, only: motion_type, new_motion
    use rodyn_scene, only: scene_type, new_scene
    use test_motions, only: motion_of, eigenvector_error
-   use test_random_scenes, only: allocate_case, kind_name, n_kinds, random_case, seed_random
+   use test_random_scenes, only: allocate_case, kind_name, n_all_kinds, random_case, seed_random
    use test_testing, only: check, check_close, new_test, unittest
    use test_trajectories, only: integrate, trajectory
    implicit none (type, external)
@@ -117,7 +117,7 @@ contains
       integer :: which, n
 
       call seed_random(11)
-      do which = 1, n_kinds
+      do which = 1, n_all_kinds
          do n = 1, 6
             call random_case(config, which, n)
             call motion_of(motion, y, config, error, ledger=.false.)
@@ -136,7 +136,7 @@ contains
       integer :: which, n, variant
 
       call seed_random(12)
-      do which = 1, n_kinds
+      do which = 1, n_all_kinds
          do variant = 0, 2
             n = 3
             call random_case(config, which, n)
@@ -173,7 +173,7 @@ contains
       integer :: which, n, i
 
       call seed_random(13)
-      do which = 1, n_kinds
+      do which = 1, n_all_kinds
          do n = 1, 4
             call random_case(config, which, n)
             call motion_of(motion, y, config, error, ledger=.false.)
@@ -474,7 +474,7 @@ contains
       do seed = 11, 22
          do i = 1, 3
             call seed_random(seed)
-            do which = 1, n_kinds
+            do which = 1, n_all_kinds
                call random_case(config, which, n_rods(i))
                deallocate (config%loads)
                allocate (config%loads(0))

@@ -6,7 +6,7 @@ module test_motion
    use rodyn_assembled, only: assembled_system, new_assembled_system, mass_matrix
    use test_testing, only: unittest, new_test, check
    use test_motions, only: random_motion, check_jacobian, check_energy_rate
-   use test_random_scenes, only: seed_random, kind_name, n_kinds
+   use test_random_scenes, only: seed_random, kind_name, n_all_kinds
    implicit none (type, external)
    private
    public :: collect_motion
@@ -27,7 +27,7 @@ contains
       integer :: which, n
 
       call seed_random(2)
-      do which = 1, n_kinds
+      do which = 1, n_all_kinds
          do n = 1, 6
             call random_motion(motion, y, which, n, 'recursive', error)
             if (.not. allocated(error)) call check_jacobian(motion, y, kind_name(which), error)
@@ -45,7 +45,7 @@ contains
       integer :: which, n, i, j
 
       call seed_random(3)
-      do which = 1, n_kinds
+      do which = 1, n_all_kinds
          if (index(kind_name(which), 'paper distributed dynamic') > 0) cycle ! its M is not that of an energy
          do n = 1, 5
             call random_motion(motion, y, which, n, 'recursive', error)
@@ -53,7 +53,7 @@ contains
             associate (scene => motion%dynamics%scene, hinges => motion%dynamics%hinges, d => motion%n_dof)
                call new_assembled_system(system, scene, motion%dynamics%hinges, error)
                if (allocated(error)) return
-               call mass_matrix(system, scene, [0.0_wp, sin(y(scene%phi_at() + 1:scene%phi_at() + n))], &
+               call mass_matrix(system, scene, scene%hinges, [0.0_wp, sin(y(scene%phi_at() + 1:scene%phi_at() + n))], &
                                 [1.0_wp, cos(y(scene%phi_at() + 1:scene%phi_at() + n))], y(:d))
                allocate (m(d, d), ei(d), ej(d))
                do i = 1, d
@@ -82,7 +82,7 @@ contains
       integer :: which, n
 
       call seed_random(4)
-      do which = 1, n_kinds
+      do which = 1, n_all_kinds
          if (index(kind_name(which), 'paper distributed dynamic') > 0) cycle
          do n = 1, 5
             call random_motion(motion, y, which, n, 'recursive', error)

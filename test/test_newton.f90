@@ -7,7 +7,7 @@ module test_newton
    use rodyn_motion, only: motion_type, new_motion, initial_state
    use rodyn_dense_newton, only: dense_newton
    use test_testing, only: unittest, new_test, check
-   use test_random_scenes, only: random_case, seed_random, uniform, kind_name, n_kinds
+   use test_random_scenes, only: random_case, seed_random, uniform, kind_name, n_all_kinds
    implicit none (type, external)
    private
    public :: collect_newton
@@ -28,7 +28,7 @@ contains
       integer :: which, i, j
 
       call seed_random(11)
-      do which = 1, n_kinds
+      do which = 1, n_all_kinds
          do i = 1, size(sizes)
             do j = 1, 3
                call random_case(config, which, sizes(i))
@@ -63,7 +63,7 @@ contains
       integer :: which, j, n
 
       call seed_random(12)
-      do which = 1, n_kinds
+      do which = 1, n_all_kinds
          do j = 1, 20
             n = 1 + mod(j, 7)
             call random_case(config, which, n)

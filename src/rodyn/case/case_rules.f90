@@ -1,13 +1,14 @@
 !> Rules that tie several keys of a case together. What one key alone must keep stands in the table.
 module rodyn_case_rules
    use rodyn_kinds, only: wp
-   use rodyn_case_config, only: case_config, load_config, profile_config
+   use rodyn_case_config, only: case_config, load_config, none_given, profile_config
    use rodyn_key_checker, only: key_checker, no_such
    use rodyn_hinge_rules, only: check_moving_hinges
    use rodyn_methods, only: list_of_methods, method_named, method_type, methods, order_rule
    use rodyn_law_rules, only: check_law
    use rodyn_rod_profile, only: rod_profile, new_rod_profile, smallest_value
    use rodyn_text, only: short_text, to_text
+   use rodyn_time_law, only: moves_smoothly
    implicit none (type, external)
    private
    public :: check_case
@@ -76,10 +77,8 @@ contains
       if (config%model%bending == 'dynamic' .and. config%model%inertia == 'lumped') then
          call checker%report('model', 1, key, "bending = 'dynamic' is not possible with inertia = 'lumped'; " &
             //"take 'quasistatic' or 'rigid'")
-      else if (config%model%bending == 'quasistatic' .and. config%model%inertia == 'distributed') then
-         call checker%report('model', 1, key, &
-            "bending = 'quasistatic' is not possible with inertia = 'distributed'; "//&
-            "take 'dynamic' or 'rigid', or inertia = 'lumped'")
+      else if (is_condensed(config)) then
+         call check_condensed(checker, config)
       end if
       if (.not. checker%is_sound('model', 1, 'bending_shapes') .or. config%model%bending_shapes /= 3) return
       if (config%model%bending /= 'dynamic') then
@@ -89,6 +88,51 @@ contains
                     '3 needs gauss_points = 5 or more (the square of the third shape has degree 8)')
       end if
    end subroutine check_model
+
+   !> Rods with mass that bend by statics?
+   pure logical function is_condensed(config)
+      type(case_config), intent(in) :: config
+      is_condensed = config%model%bending == 'quasistatic' .and. config%model%inertia == 'distributed'
+   end function is_condensed
+
+   !> Their rates follow the openings by a constant matrix: no damper has a state of its own, no spring changes its stiffness and
+   !> no kink its rate in no time.
+   subroutine check_condensed(checker, config)
+      class(key_checker), intent(inout) :: checker
+      type(case_config), intent(in) :: config
+      character(len=*), parameter :: not_here = "is not possible with bending = 'quasistatic' and inertia = 'distributed'"
+      integer :: i
+
+      if (config%model%formulation == 'inextensible') &
+         call checker%report('model', 1, 'formulation', "'inextensible' "//not_here//"; take 'consistent'")
+      if (config%model%dampers == 'exact') &
+         call checker%report('model', 1, 'dampers', "'exact' "//not_here//"; take 'reduced', or inertia = 'lumped'")
+      do i = 1, size(config%hinges)
+         associate (hinge => config%hinges(i))
+            call refuse('freeplay', hinge%freeplay > 0.0_wp)
+            call refuse('lower_stop', hinge%lower_stop < none_given)
+            call refuse('upper_stop', hinge%upper_stop < none_given)
+            call refuse('latch_angle', hinge%latch_angle < none_given)
+            call refuse('release_time', checker%is_given('hinge', i, 'release_time'))
+            call refuse('release_after', checker%is_given('hinge', i, 'release_after'))
+         end associate
+      end do
+      do i = 1, size(config%kink_programs)
+         if (.not. checker%is_sound('kink_program', i, 'law')) cycle
+         if (moves_smoothly(config%kink_programs(i)%law)) cycle
+         call checker%report('kink_program', i, 'law', "must be 'smooth_step' or 'table' with bending = 'quasistatic' and "// &
+                             "inertia = 'distributed': the rate of the kink must not jump")
+      end do
+
+   contains
+
+      subroutine refuse(key, is_there)
+         character(len=*), intent(in) :: key
+         logical, intent(in) :: is_there
+         if (is_there .and. checker%is_sound('hinge', i, key)) call checker%report('hinge', i, key, not_here)
+      end subroutine refuse
+
+   end subroutine check_condensed
 
    !> Only dynamic bending has slopes of its own; only rigid rods need no stiffness.
    subroutine check_bending(checker, config)

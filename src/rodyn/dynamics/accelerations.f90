@@ -12,6 +12,7 @@ module rodyn_accelerations
    use rodyn_recursion_flexible, only: flexible_accelerations
    use rodyn_recursion_rigid, only: rigid_accelerations
    use rodyn_recursion_lumped, only: lumped_accelerations
+   use rodyn_recursion_condensed, only: condensed_recursion, new_condensed_recursion, condensed_accelerations
    use rodyn_recursion_joints, only: joint_recursion, new_joint_recursion, joint_accelerations
    use rodyn_locks, only: has_slaves, expand
    use rodyn_lanes, only: lanes
@@ -22,7 +23,8 @@ module rodyn_accelerations
    private
    public :: dynamics_type, new_dynamics
 
-   integer, parameter :: path_flexible = 1, path_rigid = 2, path_lumped = 3, path_assembled = 4, path_joints = 5
+   integer, parameter :: path_flexible = 1, path_rigid = 2, path_lumped = 3, path_assembled = 4, path_joints = 5, &
+      path_condensed = 6
 
    !> A scene with its memory and the loads that act now. One per thread.
    type :: dynamics_type
@@ -30,6 +32,7 @@ module rodyn_accelerations
       type(hinge_law) :: hinges        !! laws that they have now
       type(workspace_type) :: work
       type(assembled_system) :: system !! for the assembled kernel only
+      type(condensed_recursion), allocatable :: condensed !! for rods with mass that bend by statics
       type(joint_recursion), allocatable :: joints !! for locked hinges and the bubble; allocated when first needed
       real(wp), allocatable :: opening_acceleration(:) !! of locked hinges, given (0:n-1) [rad/s^2]
       integer :: n_locks = 0           !! how often hinges were locked or freed: what was derived from the scene is then stale
@@ -102,6 +105,11 @@ contains
          self%path = path_joints
          if (.not. allocated(self%joints)) allocate (self%joints)
          call new_joint_recursion(self%joints, self%scene)
+      else if (self%scene%condensed) then
+         self%path = path_condensed
+         self%needs_moments = .false.
+         if (.not. allocated(self%condensed)) allocate (self%condensed)
+         call new_condensed_recursion(self%condensed, self%scene, self%hinges)
       else if (self%scene%lumped) then
          self%path = path_lumped
       else if (self%scene%dynamic_bending) then
@@ -188,6 +196,7 @@ contains
       if (.not. allocated(self%kink)) return
       call evaluate_kinks(self%kinks, t, self%kink, self%kink_rate, self%kink_acceleration)
       call self%hinges%set_kinks(self%kink, self%kink_rate)
+      self%hinges%kink_acceleration(:) = self%kink_acceleration
       self%opening_acceleration(:) = self%kink_acceleration
    end subroutine move_kinks
 
@@ -335,6 +344,9 @@ contains
             call lumped_accelerations(scene%n, scene%n_base, scene%rods, scene%rod_of, scene%node_mass, scene%body, &
                                       work%sine, work%cosine, p, work%moment, self%forces%base, &
                                       self%regime%on_nodes, self%forces%node, work%outward, acceleration, ok)
+         case (path_condensed)
+            call condensed_accelerations(self%condensed, scene, hinges, work%sine, work%cosine, q, p, self%forces%base, &
+                                         self%regime%on_nodes, self%forces%node, acceleration, ok)
          case (path_joints)
             call joint_accelerations(self%joints, scene, work%sine, work%cosine, q, p, .true., hinges%locked, &
                                      self%opening_acceleration, work%moment, self%forces%base, self%regime%on_nodes, &

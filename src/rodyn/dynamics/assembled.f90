@@ -12,6 +12,7 @@ module rodyn_assembled
    use rodyn_scene, only: scene_type
    use rodyn_hinge_law, only: hinge_law
    use rodyn_bending_matrices, only: most_shapes
+   use rodyn_condensed, only: whole_scene, whole_state, expand_slopes
    use rodyn_locks, only: has_slaves, reduce, expand, reduce_matrix, reactions
    use rodyn_lapack, only: dpotrf, dpotrs, dgesv, dgemv
    use rodyn_text, only: formatted
@@ -31,6 +32,9 @@ module rodyn_assembled
       real(wp), allocatable :: static(:, :) !! S_k, first moment outboard (2, n) [kg m]
       real(wp), allocatable :: axial(:, :)  !! X_k, the same turned by -90 degrees (2, n) [kg m]
       real(wp), allocatable :: outboard(:)  !! mass beyond rod k (0:n) [kg]
+      type(scene_type), allocatable :: whole     !! condensed rods: the chain whose slopes are coordinates (`rodyn_condensed`),
+      real(wp), allocatable :: whole_m(:, :)     !! its M; n, z and row are of its size, too
+      real(wp), allocatable :: expansion(:, :)   !! T, its rates by those of the scene
       logical :: damped = .false.       !! D is not zero
       logical :: kinked = .false.       !! Q2 is not zero
       logical :: moving = .false.       !! Q2 changes: it is made of the moments of openings and rates that are zero
@@ -46,12 +50,14 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: b(:, :), c(:, :), r(:, :)
       real(wp) :: factor(0:scene%n - 1), angle(0:scene%n - 1)
-      integer :: status, n_dof, n, k
+      integer :: status, n_dof, n, k, n_whole
 
       n = scene%n
       n_dof = scene%n_dof
-      allocate (system%k(n_dof, n_dof), system%d(n_dof, n_dof), system%m(n_dof, n_dof), system%n(n_dof, n_dof), &
-                system%z(n_dof), system%row(n_dof), system%q2(n_dof), &
+      n_whole = n_dof
+      if (scene%condensed) n_whole = n_dof + 2*n
+      allocate (system%k(n_dof, n_dof), system%d(n_dof, n_dof), system%m(n_dof, n_dof), system%n(n_whole, n_whole), &
+                system%z(n_whole), system%row(n_whole), system%q2(n_dof), &
                 system%static(2, n), system%axial(2, n), system%outboard(0:n), &
                 b(0:n - 1, n_dof), c(0:n - 1, n_dof), r(0:n - 1, n_dof), stat=status)
       if (status /= 0) then
@@ -83,7 +89,29 @@ contains
       end associate
       system%d = matmul(transpose(c), r)
       if (scene%dynamic_bending) call add_bending(scene, system%k)
+      if (scene%condensed) call expand_system(system, scene, hinges)
    end subroutine new_assembled_system
+
+   !> The chain whose slopes are coordinates, and T.
+   subroutine expand_system(system, scene, hinges)
+      type(assembled_system), intent(inout) :: system
+      type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
+      real(wp) :: unit(scene%n_dof)
+      integer :: i
+
+      allocate (system%whole)
+      system%whole = whole_scene(scene)
+      associate (n_whole => size(system%z))
+         allocate (system%whole_m(n_whole, n_whole), system%expansion(n_whole, scene%n_dof))
+      end associate
+      unit = 0.0_wp
+      do i = 1, scene%n_dof
+         unit(i) = 1.0_wp
+         call expand_slopes(scene, hinges, unit, system%expansion(:, i))
+         unit(i) = 0.0_wp
+      end do
+   end subroutine expand_system
 
    !> Constant map B from q to the openings of hinges 0..n-1.
    subroutine joint_map(scene, b)
@@ -164,13 +192,12 @@ contains
       integer :: info, n_dof
 
       n_dof = scene%n_dof
-      call mass_matrix(system, scene, sine, cosine, q)
-      call gyration_matrix(system, scene, sine, cosine, q)
-      call quadratic_rates(scene, p, system%z)
-      acceleration = 0.0_wp
-      if (scene%n_base > 0) acceleration(1:3) = base_force
-      if (loaded) call add_node_forces(scene, sine, cosine, node_force, acceleration)
-      call dgemv('N', n_dof, n_dof, -1.0_wp, system%n, n_dof, system%z, 1, 1.0_wp, acceleration, 1)
+      if (scene%condensed) then
+         call condensed_forces(system, scene, hinges, sine, cosine, q, p, base_force, loaded, node_force, acceleration)
+      else
+         call form_mass(system, scene, sine, cosine, q)
+         call inertia_forces(system, scene, sine, cosine, q, p, base_force, loaded, node_force, acceleration)
+      end if
       if (size(hinges%relaxing) > 0) then
          associate (first => scene%phi_at() + 1, n => scene%n)
             acceleration(first:) = acceleration(first:) + moment(1:n) - moment(0:n - 1)
@@ -194,6 +221,73 @@ contains
       call dpotrs('L', n_dof, 1, system%m, n_dof, acceleration, n_dof, info)
       ok = info == 0 .and. all(ieee_is_finite(acceleration))
    end subroutine assembled_accelerations
+
+   !> Q1 - N z; M must be current.
+   subroutine inertia_forces(system, scene, sine, cosine, q, p, base_force, loaded, node_force, force)
+      type(assembled_system), intent(inout) :: system
+      type(scene_type), intent(in) :: scene
+      real(wp), intent(in) :: sine(0:), cosine(0:)
+      real(wp), intent(in) :: q(:), p(:)
+      real(wp), intent(in) :: base_force(3)
+      logical, intent(in) :: loaded
+      real(wp), intent(in) :: node_force(2, *)
+      real(wp), intent(out) :: force(:) !! (dof)
+
+      call gyration_matrix(system, scene, sine, cosine, q)
+      call quadratic_rates(scene, p, system%z)
+      force = 0.0_wp
+      if (scene%n_base > 0) force(1:3) = base_force
+      if (loaded) call add_node_forces(scene, sine, cosine, node_force, force)
+      associate (n_dof => scene%n_dof)
+         call dgemv('N', n_dof, n_dof, -1.0_wp, system%n, n_dof, system%z, 1, 1.0_wp, force, 1)
+      end associate
+   end subroutine inertia_forces
+
+   !> The same of condensed rods, T^T (Q1 - N z - M a) with the accelerations a that kinks add to the slopes, and T^T M T.
+   subroutine condensed_forces(system, scene, hinges, sine, cosine, q, p, base_force, loaded, node_force, force)
+      type(assembled_system), intent(inout) :: system
+      type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
+      real(wp), intent(in) :: sine(0:), cosine(0:)
+      real(wp), intent(in) :: q(:), p(:)
+      real(wp), intent(in) :: base_force(3)
+      logical, intent(in) :: loaded
+      real(wp), intent(in) :: node_force(2, *)
+      real(wp), intent(out) :: force(:) !! (dof)
+      real(wp), dimension(size(system%z)) :: whole_q, whole_p, whole_force, given
+      real(wp), allocatable :: reduced(:, :)
+      real(wp) :: still(scene%n_dof)
+
+      call whole_state(scene, hinges, q, p, whole_q, whole_p)
+      still = 0.0_wp
+      call expand_slopes(scene, hinges, still, given, hinges%kink_acceleration)
+      call move_alloc(system%m, reduced)
+      call move_alloc(system%whole_m, system%m)
+      call form_mass(system, system%whole, sine, cosine, whole_q)
+      call inertia_forces(system, system%whole, sine, cosine, whole_q, whole_p, base_force, loaded, node_force, whole_force)
+      force = matmul(whole_force - matmul(system%m, given), system%expansion)
+      reduced(:, :) = matmul(transpose(system%expansion), matmul(system%m, system%expansion))
+      call move_alloc(system%m, system%whole_m)
+      call move_alloc(reduced, system%m)
+   end subroutine condensed_forces
+
+   !> M(q) of a scene into system%m; of condensed rods T^T M T.
+   subroutine mass_matrix(system, scene, hinges, sine, cosine, q)
+      type(assembled_system), intent(inout) :: system
+      type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
+      real(wp), intent(in) :: sine(0:), cosine(0:) !! of phi (0:n)
+      real(wp), intent(in) :: q(:)                 !! coordinates (dof)
+      real(wp), dimension(scene%n_dof) :: rest, force
+      real(wp), parameter :: none(3) = 0.0_wp, nowhere(2, 1) = 0.0_wp
+
+      if (.not. scene%condensed) then
+         call form_mass(system, scene, sine, cosine, q)
+         return
+      end if
+      rest = 0.0_wp
+      call condensed_forces(system, scene, hinges, sine, cosine, q, rest, none, .false., nowhere, force)
+   end subroutine mass_matrix
 
    !> Forces of moments T(0:n) in the hinges, T(n) = 0, but those of locked hinges that `solve_locked` finds.
    pure subroutine add_moments(scene, hinges, moment, force)
@@ -303,7 +397,7 @@ contains
    !> With absolute rotations Phi_k = theta + phi_k, the outboard part moves by S_k^perp = S_k dPhi_k,
    !>     S_k = (m1 + l M_out) n_k - int m v e_k;
    !> the row of w is the row of the spacecraft's own rotation plus those of all Phi_k.
-   subroutine mass_matrix(system, scene, sine, cosine, q)
+   subroutine form_mass(system, scene, sine, cosine, q)
       type(assembled_system), intent(inout) :: system
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: sine(0:), cosine(0:) !! of phi (0:n)
@@ -340,7 +434,7 @@ contains
          end do
          if (scene%n_base > 0) call add_spacecraft_rows(system, scene, sine, cosine)
       end associate
-   end subroutine mass_matrix
+   end subroutine form_mass
 
    !> m(i, j) = m(j, i) = value.
    pure subroutine set_pair(m, i, j, value)

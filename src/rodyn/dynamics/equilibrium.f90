@@ -251,7 +251,7 @@ contains
       if (.not. ok) return
       associate (b => motion%dynamics%scene%n_base, r => motion%n_q, m => motion%n_dof, scene => motion%dynamics%scene, &
                  hinges => motion%dynamics%hinges, work => motion%dynamics%work, mass => motion%system%m)
-         call mass_matrix(motion%system, scene, work%sine, work%cosine, y(1:r))
+         call mass_matrix(motion%system, scene, hinges, work%sine, work%cosine, y(1:r))
          forces = matmul(mass, rate(r + 1:r + m))
          solver%carried = mass(:, 1:b)
          if (has_slaves(hinges)) then

@@ -68,7 +68,7 @@ contains
       cosine(0) = 1.0_wp
       sine(1:) = sin(q(scene%phi_at() + 1:scene%phi_at() + scene%n))
       cosine(1:) = cos(q(scene%phi_at() + 1:scene%phi_at() + scene%n))
-      call mass_matrix(system, scene, sine, cosine, q)
+      call mass_matrix(system, scene, hinges, sine, cosine, q)
       mass = system%m
       if (has_slaves(hinges)) then
          call reduce_matrix(scene, hinges%locked, 1.0_wp, mass)

@@ -39,7 +39,7 @@ contains
       velocity = 0.0_wp
       place = 0.0_wp
       rotation = 0.0_wp
-      call sum_chain(scene, q, p, sums)
+      call sum_chain(scene, hinges, q, p, sums)
       values%kinetic = sums%kinetic
       if (scene%n_base > 0) then
          velocity = p(1:2)
@@ -68,13 +68,16 @@ contains
    end function kinetic_energy
 
    !> One pass outward. A point of rod k moves by U + W (s n - v e) + v' n, U the velocity of its inner node.
-   pure subroutine sum_chain(scene, q, p, sums)
+   pure subroutine sum_chain(scene, hinges, q, p, sums)
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       real(wp), intent(in) :: q(:), p(:)
       type(chain_sums), intent(out) :: sums
       real(wp) :: u(2), place(2), axis(2), normal(2), omega, w, x(most_shapes), xr(most_shapes), first(2), flow(2), spin, inertia
+      real(wp), dimension(scene%n) :: alpha, beta, alpha_rate, beta_rate ! of condensed rods
       integer :: k
 
+      if (scene%condensed) call slopes(scene, hinges, q, p, alpha, beta, alpha_rate, beta_rate)
       call at_hinge_0(scene, q, p, place, u, omega)
       call add_mass(sums, scene%node_mass(0), place, u)
       do k = 1, scene%n
@@ -83,6 +86,10 @@ contains
          w = omega + p(scene%phi_at() + k)
          x = scene%bends(k, q)
          xr = scene%bends(k, p)
+         if (scene%condensed) then
+            x(1:2) = [alpha(k), beta(k)]
+            xr(1:2) = [alpha_rate(k), beta_rate(k)]
+         end if
          associate (rod => scene%rods(scene%rod_of(k)), i => scene%rods(scene%rod_of(k))%inertia, &
                     bend => scene%bending(scene%rod_of(k)))
             first = i%m1*axis + dot_product(bend%first, x)*normal           ! int m (s e + v n)

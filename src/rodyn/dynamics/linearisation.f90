@@ -10,6 +10,7 @@ module rodyn_linearisation
    use rodyn_scene, only: scene_type
    use rodyn_bending_matrices, only: most_shapes
    use rodyn_hinge_law, only: hinge_law, hinge_tangent
+   use rodyn_condensed, only: whole_scene, whole_state, expand_slopes, reduce_slopes
    implicit none (type, external)
    private
    public :: balance_tangent
@@ -32,9 +33,41 @@ contains
       associate (first => scene%n_base + 1)
          call hinge_tangent(hinges, scene%n, scene%dynamic_bending, dq(first:), dp(first:), work, moment)
       end associate
+      if (scene%condensed) then
+         call condensed_tangent(scene, hinges, q, p, a, loaded, node_force, dq, dp, moment, dr)
+         return
+      end if
       call outward_pass(scene, q, p, a, dq, dp, inner, d_inner)
       call inward_pass(scene, q, p, a, loaded, node_force, dq, dp, inner, d_inner, moment, dr)
    end subroutine balance_tangent
+
+   !> Condensed rods: the inertia of the whole chain, whose slopes follow (`rodyn_condensed`).
+   pure subroutine condensed_tangent(scene, hinges, q, p, a, loaded, node_force, dq, dp, moment, dr)
+      type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
+      real(wp), intent(in) :: q(:), p(:), a(:)
+      logical, intent(in) :: loaded
+      real(wp), intent(in) :: node_force(:, :), dq(:), dp(:)
+      real(wp), intent(in) :: moment(0:) !! changes of the hinge moments (0:n)
+      real(wp), intent(out) :: dr(:)
+      real(wp) :: inner(2, scene%n), d_inner(2, scene%n), still(0:scene%n)
+      real(wp), dimension(scene%n_base + 3*scene%n) :: angles, rates, whole_a, d_angles, d_rates, row
+      type(scene_type) :: whole
+      integer :: k
+
+      whole = whole_scene(scene)
+      still = 0.0_wp
+      call whole_state(scene, hinges, q, p, angles, rates)
+      call expand_slopes(scene, hinges, a, whole_a, hinges%kink_acceleration)
+      call expand_slopes(scene, hinges, dq, d_angles)
+      call expand_slopes(scene, hinges, dp, d_rates)
+      call outward_pass(whole, angles, rates, whole_a, d_angles, d_rates, inner, d_inner)
+      call inward_pass(whole, angles, rates, whole_a, loaded, node_force, d_angles, d_rates, inner, d_inner, still, row)
+      call reduce_slopes(scene, hinges, row, dr)
+      do k = 1, scene%n
+         dr(scene%phi_at() + k) = dr(scene%phi_at() + k) - (moment(k) - moment(k - 1))
+      end do
+   end subroutine condensed_tangent
 
    !> Accelerations of the inner nodes: A_k = A_{k-1} + l n W' - l W^2 e.
    pure subroutine outward_pass(scene, q, p, a, dq, dp, inner, d_inner)

@@ -19,6 +19,7 @@ module rodyn_motion
    use rodyn_hinge_events, only: event_set, new_event_set
    use rodyn_accelerations, only: dynamics_type, new_dynamics
    use rodyn_assembled, only: assembled_system, new_assembled_system, mass_matrix
+   use rodyn_condensed, only: add_inertia_moments
    use rodyn_linearisation, only: balance_tangent
    use rodyn_newton, only: newton_type
    use rodyn_locks, only: has_slaves, reduce, expand, reduce_matrix
@@ -147,20 +148,22 @@ contains
             ydot(2) = ydot(2) - y(r + 3)*y(1)
          end if
          if (r > m) call relaxation_rates(self%dynamics%hinges, self%dynamics%work%moment, y(m + 1:r), ydot(m + 1:r))
-         if (size(ydot) > r + m) call powers(self, y(1:r), y(r + 1:r + m), ydot(m + 1:r), ydot(r + m + 1:))
+         if (size(ydot) > r + m) &
+            call powers(self, y(1:r), y(r + 1:r + m), ydot(r + 1:r + m), ydot(m + 1:r), ydot(r + m + 1:))
       end associate
    end subroutine rhs
 
    !> Power of the loads and dissipated power. The loads are those of the last evaluation.
-   subroutine powers(self, q, p, joint_rate, power)
+   subroutine powers(self, q, p, a, joint_rate, power)
       class(motion_type), intent(inout) :: self
       real(wp), contiguous, intent(in) :: q(:), p(:)
+      real(wp), contiguous, intent(in) :: a(:) !! p', used by driven kinks between condensed rods
       real(wp), intent(in) :: joint_rate(:) !! th' of the relaxing hinges [rad/s]
       real(wp), intent(out) :: power(2)     !! [W]
 
       power(1) = load_power(self%dynamics%scene, q, p, self%dynamics%forces%base, &
                             self%dynamics%regime%on_nodes, self%dynamics%forces%node)
-      if (self%dynamics%driven) power(1) = power(1) + drive_power(self, q, p)
+      if (self%dynamics%driven) power(1) = power(1) + drive_power(self, q, p, a)
       associate (scene => self%dynamics%scene, hinges => self%dynamics%hinges)
          if (size(joint_rate) > 0) then
             power(2) = relaxing_power(hinges, joint_rate)
@@ -171,12 +174,12 @@ contains
    end subroutine powers
 
    !> Power of the drives of moving kinks [W]: -sum T gamma'. Overwrites the moments in the workspace with all of T.
-   real(wp) function drive_power(self, q, p)
+   real(wp) function drive_power(self, q, p, a)
       class(motion_type), intent(inout) :: self
-      real(wp), contiguous, intent(in) :: q(:), p(:)
+      real(wp), contiguous, intent(in) :: q(:), p(:), a(:)
       integer :: k
 
-      call complete_moments(self, q, p)
+      call complete_moments(self, q, p, a)
       drive_power = 0.0_wp
       do k = 0, self%dynamics%scene%n - 1
          drive_power = drive_power - self%dynamics%work%moment(k)*self%dynamics%hinges%kink_rate(k)
@@ -184,15 +187,17 @@ contains
    end function drive_power
 
    !> Moments in all hinges into the workspace, where the kernel has left those of locked ones.
-   subroutine complete_moments(self, q, p)
+   subroutine complete_moments(self, q, p, a)
       class(motion_type), intent(inout) :: self
       real(wp), contiguous, intent(in) :: q(:), p(:)
+      real(wp), contiguous, intent(in) :: a(:) !! p'
 
       associate (scene => self%dynamics%scene, hinges => self%dynamics%hinges, work => self%dynamics%work, &
                  first => self%dynamics%scene%n_base + 1)
          if (has_slaves(hinges)) work%theta(0:) = work%moment(:scene%n - 1)
          call hinge_moments(hinges, scene%n, scene%dynamic_bending, q(first:), p(first:), work%theta, work%moment)
          if (has_slaves(hinges)) work%moment(:scene%n - 1) = merge(work%theta(0:), work%moment(:scene%n - 1), hinges%locked)
+         if (scene%condensed) call add_inertia_moments(scene, hinges, q, p, a, work%moment)
       end associate
    end subroutine complete_moments
 
@@ -210,7 +215,7 @@ contains
 
       associate (r => self%n_q, m => self%n_dof, scene => self%dynamics%scene)
          call self%dynamics%accelerations(t, y(1:r), y(r + 1:r + m), acceleration, ok)
-         call complete_moments(self, y(1:r), y(r + 1:r + m))
+         call complete_moments(self, y(1:r), y(r + 1:r + m), acceleration)
          moment = self%dynamics%work%moment(:scene%n - 1)
          associate (first => scene%n_base + 1)
             call hinge_state(self%dynamics%hinges, scene%n, scene%dynamic_bending, y(first:r), y(r + first:r + m), theta, rate, &
@@ -287,13 +292,13 @@ contains
 
       ok = .true.
       associate (dynamics => self%dynamics, r => self%n_q, m => self%n_dof, joint_rate => self%joint_rate)
-         if (r > m .or. (dynamics%driven .and. has_slaves(dynamics%hinges))) then
+         if (r > m .or. (dynamics%driven .and. (has_slaves(dynamics%hinges) .or. dynamics%scene%condensed))) then
             call dynamics%accelerations(t, y(1:r), y(r + 1:r + m), self%acceleration, ok)
             if (r > m) call relaxation_rates(dynamics%hinges, dynamics%work%moment, y(m + 1:r), joint_rate)
          else if (dynamics%varying) then
             call dynamics%refresh(t, y(1:r), y(r + 1:r + m))
          end if
-         call powers(self, y(1:r), y(r + 1:r + m), joint_rate, rate)
+         call powers(self, y(1:r), y(r + 1:r + m), self%acceleration, joint_rate, rate)
       end associate
    end subroutine quadratures
 
@@ -444,7 +449,7 @@ contains
          ok = ok .and. .not. allocated(error)
          if (.not. ok) return
          call balance_derivatives(self, y, a, by_state, joints)
-         call mass_matrix(self%system, scene, work%sine, work%cosine, y(1:r))
+         call mass_matrix(self%system, scene, self%dynamics%hinges, work%sine, work%cosine, y(1:r))
       end associate
    end subroutine differentiate_balance
 
@@ -547,7 +552,7 @@ contains
    !> The O(n) factorisation knows neither locked hinges nor a third bending shape.
    pure logical function is_dense(self)
       class(motion_type), intent(in) :: self
-      is_dense = self%dynamics%hinges%has_locks .or. self%dynamics%scene%n_bend == 3
+      is_dense = self%dynamics%hinges%has_locks .or. self%dynamics%scene%n_bend == 3 .or. self%dynamics%scene%condensed
    end function is_dense
 
    !> x <- (1 - gamma J)^-1 x.

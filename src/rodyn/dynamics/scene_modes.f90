@@ -158,7 +158,7 @@ contains
       if (weight_matters(self, wanted)) call factor(self, wanted)
       m = scene%n_dof
       rank = size(self%columns, 2)
-      call mass_matrix(self%system, scene, sine, cosine, q)
+      call mass_matrix(self%system, scene, hinges, sine, cosine, q)
       do i = 1, rank
          self%columns(:m, i) = self%columns(m + 1:, i)
          if (has_slaves(hinges)) call reduce(scene, hinges%locked, self%columns(:m, i))

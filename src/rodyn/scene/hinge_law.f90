@@ -30,6 +30,7 @@ module rodyn_hinge_law
       real(wp), allocatable :: damping(:)   !! D (0:n-1) [N m s/rad]
       real(wp), allocatable :: kink(:)      !! gamma (0:n-1) [rad]
       real(wp), allocatable :: kink_rate(:) !! gamma' (0:n-1) [rad/s]
+      real(wp), allocatable :: kink_acceleration(:) !! gamma'' (0:n-1) [rad/s^2]
       real(wp), allocatable :: constant(:)  !! t0 (0:n-1) [N m]
       real(wp), allocatable :: friction(:)  !! f (0:n-1) [N m]
       real(wp), allocatable :: offset(:)    !! C gamma + D gamma' - t0 - f (0:n-1) [N m]
@@ -73,6 +74,7 @@ contains
 
       law%n = chain%n_rods
       allocate (law%stiffness(0:law%n - 1), law%damping(0:law%n - 1), law%kink(0:law%n - 1), law%kink_rate(0:law%n - 1), &
+                law%kink_acceleration(0:law%n - 1), &
                 law%constant(0:law%n - 1), law%friction(0:law%n - 1), law%offset(0:law%n - 1), &
                 law%steady(0:law%n - 1), law%bent(0:law%n - 1), &
                 source=0.0_wp)
@@ -225,6 +227,7 @@ contains
       self%friction = 0.0_wp
       self%steady = 0.0_wp
       self%bent = 0.0_wp
+      self%kink_acceleration = 0.0_wp
       call self%set_kinks(opening, spread(0.0_wp, 1, self%n))
    end subroutine rest_at
 

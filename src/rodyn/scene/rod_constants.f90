@@ -13,7 +13,8 @@ module rodyn_rod_constants
    !>     g = B^-1 (a1, b1),   h = B^-1 (sa, sb),
    !> and `reduced` inertias after elimination of alpha'', beta'':
    !>     m0 - (a1, b1).g,   m1 - (sa, sb).g,   m2 - (sa, sb).h.
-   !> A lumped rod has no inertia at all; a rigid one has m0, m1, m2 only (its reduced inertias are those).
+   !> A lumped rod has no inertia at all; a rigid one has m0, m1, m2 only (its reduced inertias are those); one that bends by
+   !> statics has all integrals and no reduced inertias.
    type :: rod_constants
       real(wp) :: length = 0.0_wp            !! l [m]
       real(wp) :: bending_stiffness = 0.0_wp !! EI, where it varies what the profile multiplies [N m^2]
@@ -60,13 +61,14 @@ contains
       if (bending_stiffness > 0.0_wp) call resist_bending(rod, rule, flexible, ok, stiffness_profile)
       call integrate_mass(rod, mass_per_length, rule, lumped, mass_profile)
       if (lumped .or. .not. ok) return
-      if (flexible) then
-         if (consistent) rod%second = [rod%inertia%aa, rod%inertia%ab, rod%inertia%bb]
-         call reduce(rod, ok)
-         call join_chain(rod)
-      else
+      if (.not. (flexible .or. bending_stiffness > 0.0_wp)) then
          call stiffen(rod)
+         return
       end if
+      if (consistent) rod%second = [rod%inertia%aa, rod%inertia%ab, rod%inertia%bb]
+      if (.not. flexible) return
+      call reduce(rod, ok)
+      call join_chain(rod)
    end subroutine new_rod_constants
 
    !> A rod whose bending is no motion: nothing is to be eliminated from m0, m1, m2.

@@ -35,6 +35,7 @@ module rodyn_scene
       logical :: dynamic_bending = .true. !! n_bend > 0: alpha and beta are unknowns
       logical :: quasistatic = .false.    !! alpha and beta follow from the hinge moments
       logical :: lumped = .false.         !! all mass in the nodes
+      logical :: condensed = .false.      !! quasistatic and not lumped: rods have mass where they bend without inertia of their own
       logical :: consistent = .true.      !! second-order inertia terms kept
       logical :: assembled = .false.      !! kernel: assembled instead of recursive
       type(spacecraft_body) :: body
@@ -127,6 +128,7 @@ contains
       scene%dynamic_bending = config%model%bending == 'dynamic'
       scene%quasistatic = config%model%bending == 'quasistatic'
       scene%lumped = config%model%inertia == 'lumped'
+      scene%condensed = scene%quasistatic .and. .not. scene%lumped
       scene%consistent = config%model%formulation == 'consistent'
       scene%assembled = config%model%kernel == 'assembled'
       scene%n_bend = merge(config%model%bending_shapes, 0, scene%dynamic_bending)
@@ -193,7 +195,7 @@ contains
                           exit_bad_input)
                return
             end if
-            scene%bending(j) = new_bending_matrices(rods(j), scene%n_bend, scene%consistent)
+            scene%bending(j) = new_bending_matrices(rods(j), merge(2, scene%n_bend, scene%condensed), scene%consistent)
          end associate
       end do
       call move_alloc(rods, scene%rods)
