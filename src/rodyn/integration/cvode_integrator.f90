@@ -42,10 +42,8 @@ module rodyn_cvode_integrator
                                                                                        !! of the last internal step
       type(quadrature_history) :: history !! rates in the last steps
    contains
-      procedure :: initialize
-      procedure :: reinitialize
-      procedure :: begin_history
-      procedure :: tell_stop
+      procedure :: begin
+      procedure :: set_library_stop
       procedure :: evolve
       procedure :: complete_step
       procedure :: output
@@ -97,11 +95,16 @@ contains
       inner_options = tightened(options, shorter, order + 1)
    end function inner_options
 
-   subroutine initialize(self, t, error)
+   subroutine begin(self, t, error)
       class(cvode_integrator), intent(inout) :: self
       real(wp), intent(in) :: t !! [s]
       type(error_type), allocatable, intent(inout) :: error
 
+      if (self%system%has_quadratures()) call self%history%begin(t, self%rate)
+      if (self%initialized) then ! at order one, without history
+         call check(error, FCVodeReInit(self%memory, t, self%state), 'CVodeReInit', t)
+         return
+      end if
       associate (memory => self%memory)
          call check(error, FCVodeSetErrHandlerFn(memory, c_funloc(quiet_handler), c_null_ptr), 'CVodeSetErrHandlerFn')
          call check(error, FCVodeInit(memory, c_funloc(rhs_shim), t, self%state), 'CVodeInit', t)
@@ -116,7 +119,7 @@ contains
       else
          call attach_newton(self, error)
       end if
-   end subroutine initialize
+   end subroutine begin
 
    !> Adams: functional iteration y <- g(y), no acceleration (m = 0): the iteration converges in one or two passes.
    subroutine attach_fixed_point(self, error)
@@ -147,27 +150,11 @@ contains
       call check(error, FCVodeSetStabLimDet(self%memory, 1_c_int), 'CVodeSetStabLimDet')
    end subroutine attach_newton
 
-   !> Order one, no history.
-   subroutine reinitialize(self, t, error)
-      class(cvode_integrator), intent(inout) :: self
-      real(wp), intent(in) :: t !! [s]
-      type(error_type), allocatable, intent(inout) :: error
-      call check(error, FCVodeReInit(self%memory, t, self%state), 'CVodeReInit', t)
-   end subroutine reinitialize
-
-   subroutine begin_history(self, t, error)
-      class(cvode_integrator), intent(inout) :: self
-      real(wp), intent(in) :: t !! [s]
-      type(error_type), allocatable, intent(inout) :: error
-      associate (unused => error); end associate
-      if (self%system%has_quadratures()) call self%history%begin(t, self%rate)
-   end subroutine begin_history
-
-   subroutine tell_stop(self, error)
+   subroutine set_library_stop(self, error)
       class(cvode_integrator), intent(inout) :: self
       type(error_type), allocatable, intent(inout) :: error
       call check(error, FCVodeSetStopTime(self%memory, self%t_stop), 'CVodeSetStopTime', self%t_good)
-   end subroutine tell_stop
+   end subroutine set_library_stop
 
    subroutine evolve(self, t_reached, error)
       class(cvode_integrator), intent(inout) :: self

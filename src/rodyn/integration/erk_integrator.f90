@@ -45,10 +45,8 @@ module rodyn_erk_integrator
       type(quadrature_refinement) :: refinement
       type(step_grid) :: grid                 !! fixed steps
    contains
-      procedure :: initialize
-      procedure :: reinitialize
-      procedure :: begin_history
-      procedure :: tell_stop
+      procedure :: begin
+      procedure :: set_library_stop
       procedure :: evolve
       procedure :: complete_step
       procedure :: output
@@ -74,12 +72,18 @@ contains
                        'ERKStepEvolve', error)
    end subroutine new_erk_integrator
 
-   subroutine initialize(self, t, error)
+   subroutine begin(self, t, error)
       class(erk_integrator), intent(inout) :: self
       real(wp), intent(in) :: t !! [s]
       type(error_type), allocatable, intent(inout) :: error
       integer(c_int), parameter :: interpolant_degree = 3_c_int !! no evaluations of its own
 
+      if (self%system%n_events > 0) call rates_now(self, error) ! for the first look into a step
+      if (allocated(error)) return
+      if (self%initialized) then ! the first step is chosen again
+         call check(error, FERKStepReInit(self%memory, c_funloc(rhs_shim), t, self%state), 'ERKStepReInit', t)
+         return
+      end if
       self%memory = FERKStepCreate(c_funloc(rhs_shim), t, self%state, self%context)
       if (.not. c_associated(self%memory)) then
          call raise(error, 'ERKStepCreate: out of memory')
@@ -97,24 +101,7 @@ contains
          if (self%options%max_step > 0.0_wp) &
             call check(error, FERKStepSetMaxStep(memory, self%options%max_step), 'ERKStepSetMaxStep')
       end associate
-   end subroutine initialize
-
-   !> The first step is chosen again.
-   subroutine reinitialize(self, t, error)
-      class(erk_integrator), intent(inout) :: self
-      real(wp), intent(in) :: t !! [s]
-      type(error_type), allocatable, intent(inout) :: error
-      call check(error, FERKStepReInit(self%memory, c_funloc(rhs_shim), t, self%state), 'ERKStepReInit', t)
-   end subroutine reinitialize
-
-   !> Rates at the start, for the first look into a step.
-   subroutine begin_history(self, t, error)
-      class(erk_integrator), intent(inout) :: self
-      real(wp), intent(in) :: t !! [s]
-      type(error_type), allocatable, intent(inout) :: error
-      associate (unused => t); end associate
-      if (self%system%n_events > 0) call rates_now(self, error)
-   end subroutine begin_history
+   end subroutine begin
 
    !> Give ERKStep the table of the chosen order, and keep a copy for the outputs.
    subroutine choose_table(self, error)
@@ -143,12 +130,12 @@ contains
       flag = 0_c_int
    end function nothing_to_do
 
-   subroutine tell_stop(self, error)
+   subroutine set_library_stop(self, error)
       class(erk_integrator), intent(inout) :: self
       type(error_type), allocatable, intent(inout) :: error
       call check(error, FERKStepSetStopTime(self%memory, self%t_stop), 'ERKStepSetStopTime', self%t_good)
       if (.not. allocated(error)) call self%grid%lay(self%t_good, self%t_stop, self%options%fixed_step, error)
-   end subroutine tell_stop
+   end subroutine set_library_stop
 
    subroutine evolve(self, t_reached, error)
       class(erk_integrator), intent(inout) :: self

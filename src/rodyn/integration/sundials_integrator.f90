@@ -38,25 +38,23 @@ module rodyn_sundials_integrator
       procedure :: look_for_event
       procedure :: rates_of_quadratures
       procedure :: counts_of_steps
-      procedure(at_time_interface), deferred :: initialize    !! hand everything over to the library, once
-      procedure(at_time_interface), deferred :: reinitialize  !! start the library anew
-      procedure(at_time_interface), deferred :: begin_history !! note what the first step will need of its start
-      procedure(plain_interface), deferred :: tell_stop       !! tell the library `t_stop`
-      procedure(evolve_interface), deferred :: evolve         !! one step of the library
-      procedure(plain_interface), deferred :: complete_step   !! quadratures and events of a step
-      procedure(output_interface), deferred :: output         !! the state inside the last step
-      procedure(plain_interface), deferred :: rates_at_ends   !! f_before and f_after
-      procedure(free_interface), deferred :: free_memory      !! `memory` and what belongs to it
+      procedure(begin_interface), deferred :: begin         !! hand everything over to the library, or start it anew
+      procedure(plain_interface), deferred :: set_library_stop !! let the library know `t_stop`
+      procedure(evolve_interface), deferred :: evolve       !! one step of the library
+      procedure(plain_interface), deferred :: complete_step !! quadratures and events of a step
+      procedure(output_interface), deferred :: output       !! the state inside the last step
+      procedure(plain_interface), deferred :: rates_at_ends !! f_before and f_after
+      procedure(free_interface), deferred :: free_memory    !! `memory` and what belongs to it
    end type sundials_integrator
 
    abstract interface
-      subroutine at_time_interface(self, t, error)
+      subroutine begin_interface(self, t, error)
          import :: sundials_integrator, error_type, wp
          implicit none (type, external)
          class(sundials_integrator), intent(inout) :: self
          real(wp), intent(in) :: t !! [s]
          type(error_type), allocatable, intent(inout) :: error
-      end subroutine at_time_interface
+      end subroutine begin_interface
 
       subroutine plain_interface(self, error)
          import :: sundials_integrator, error_type
@@ -134,15 +132,9 @@ contains
       self%t_before = t
       self%stop_in_force = -huge(1.0_wp)
       if (self%system%has_quadratures()) call self%rates_of_quadratures(t, self%y_good(:self%system%n_controlled), self%rate, error)
-      if (.not. allocated(error)) call self%begin_history(t, error)
-      if (allocated(error)) return
-      if (self%initialized) then
-         self%before_restart = self%statistics()
-         call self%reinitialize(t, error)
-      else
-         call self%initialize(t, error)
-         self%initialized = .not. allocated(error)
-      end if
+      if (self%initialized) self%before_restart = self%statistics()
+      if (.not. allocated(error)) call self%begin(t, error)
+      self%initialized = self%initialized .or. .not. allocated(error)
    end subroutine start
 
    !> Step past t_out, but never past the stop time; an output lies inside the last step.
@@ -175,7 +167,7 @@ contains
       type(error_type), allocatable, intent(inout) :: error
       if (.not. (self%stop_in_force < self%t_stop .or. self%stop_in_force > self%t_stop)) return
       if (.not. self%t_stop > self%t_good) return
-      call self%tell_stop(error)
+      call self%set_library_stop(error)
       if (.not. allocated(error)) self%stop_in_force = self%t_stop
    end subroutine check_stop
 
