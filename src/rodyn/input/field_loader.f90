@@ -4,7 +4,7 @@ module rodyn_field_loader
    use rodyn_kinds, only: wp
    use rodyn_field_visitor, only: field_visitor
    use rodyn_checked_document, only: checked_document, group_at
-   use rodyn_namelist_document, only: namelist_value, string_content
+   use rodyn_namelist_document, only: string_content
    use rodyn_schema, only: schema_group, schema_row, name_length, any_list, matching_word
    use rodyn_text, only: word
    implicit none (type, external)
@@ -67,25 +67,21 @@ contains
       found = 0
    end function find
 
-   !> The one value of an entry.
-   function value_of(self, entry) result(value)
-      class(field_loader), intent(in) :: self
-      integer, intent(in) :: entry
-      type(namelist_value) :: value
-      value = self%checked%document%values(self%checked%document%entries(entry)%first)
-   end function value_of
+   !> The place of the one value of a key; 0: it has none.
+   integer function place_of(self, row) result(place)
+      class(field_loader), intent(inout) :: self
+      type(schema_row), intent(in) :: row
+      place = find(self, row)
+      if (place > 0) place = self%checked%document%entries(place)%first
+   end function place_of
 
    subroutine real_field(self, x, row)
       class(field_loader), intent(inout) :: self
       real(wp), intent(inout) :: x
       type(schema_row), intent(in) :: row
-      type(namelist_value) :: value
-      integer :: e
-
-      e = find(self, row)
-      if (e == 0) return
-      value = value_of(self, e)
-      x = value%x
+      integer :: place
+      place = place_of(self, row)
+      if (place > 0) x = self%checked%document%values(place)%x
    end subroutine real_field
 
    !> Arrays over an extent get its length, 0 by default; lists the length they have in the file.
@@ -159,26 +155,18 @@ contains
       class(field_loader), intent(inout) :: self
       integer, intent(inout) :: x
       type(schema_row), intent(in) :: row
-      type(namelist_value) :: value
-      integer :: e
-
-      e = find(self, row)
-      if (e == 0) return
-      value = value_of(self, e)
-      x = value%number
+      integer :: place
+      place = place_of(self, row)
+      if (place > 0) x = self%checked%document%values(place)%number
    end subroutine integer_field
 
    subroutine logical_field(self, x, row)
       class(field_loader), intent(inout) :: self
       logical, intent(inout) :: x
       type(schema_row), intent(in) :: row
-      type(namelist_value) :: value
-      integer :: e
-
-      e = find(self, row)
-      if (e == 0) return
-      value = value_of(self, e)
-      x = value%truth
+      integer :: place
+      place = place_of(self, row)
+      if (place > 0) x = self%checked%document%values(place)%truth
    end subroutine logical_field
 
    !> A word takes the spelling of the table.
@@ -186,21 +174,23 @@ contains
       class(field_loader), intent(inout) :: self
       character(len=name_length), intent(inout) :: x
       type(schema_row), intent(in) :: row
-      integer :: e
+      integer :: place
 
-      e = find(self, row)
-      if (e > 0) x = word(row%words, matching_word(row, string_content(self%checked%document, value_of(self, e))))
+      place = place_of(self, row)
+      associate (document => self%checked%document)
+         if (place > 0) x = word(row%words, matching_word(row, string_content(document, document%values(place))))
+      end associate
    end subroutine word_field
 
    subroutine text_field(self, x, row)
       class(field_loader), intent(inout) :: self
       character(len=:), allocatable, intent(inout) :: x
       type(schema_row), intent(in) :: row
-      integer :: e
+      integer :: place
 
-      e = find(self, row)
-      if (e > 0) then
-         x = string_content(self%checked%document, value_of(self, e))
+      place = place_of(self, row)
+      if (place > 0) then
+         x = string_content(self%checked%document, self%checked%document%values(place))
       else if (.not. allocated(x)) then
          x = ''
       end if

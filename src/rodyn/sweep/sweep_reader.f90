@@ -168,6 +168,7 @@ contains
       integer, intent(in) :: i !! which
       type(axis_keys), intent(inout) :: keys !! what the file says; its values go to the axis
       type(sweep_axis), intent(inout) :: axis
+      character(len=5), parameter :: range_keys(3) = [character(len=5) :: 'start', 'stop', 'count']
       integer :: k
       logical :: by_values, by_texts, by_range
 
@@ -208,13 +209,6 @@ contains
          character(len=*), intent(in) :: key
          given = is_given(checked, 'axis', i, key)
       end function given
-
-      pure function range_keys(k) result(key)
-         integer, intent(in) :: k
-         character(len=5) :: key
-         character(len=5), parameter :: keys(3) = [character(len=5) :: 'start', 'stop', 'count']
-         key = keys(k)
-      end function range_keys
 
    end subroutine load_axis
 
