@@ -216,7 +216,7 @@ contains
       type(solver_statistics) :: stats
       call prepare(run, released_and_latched, error)
       if (allocated(error)) return
-      run%driver%members(2)%gave_up = .true.
+      run%driver%members(2)%has_failed = .true.
       call perform(run, error)
       if (allocated(error)) return
       stats = run%driver%members(2)%integrator%statistics()

@@ -25,7 +25,7 @@ module test_ensemble
       type(solver_statistics) :: counts
       character(len=200) :: message = ''
       real(wp) :: t = 0.0_wp
-      logical :: gave_up = .false.
+      logical :: has_failed = .false.
    end type outcome
 
    !> A case with its number.
@@ -128,7 +128,7 @@ contains
          associate (kept => self%outcomes(member%number))
             kept%counts = member%counts
             kept%t = member%t
-            kept%gave_up = member%gave_up
+            kept%has_failed = member%has_failed
             if (allocated(member%error)) kept%message = member%error%message
             if (member%late) kept%message = 'late'
          end associate
@@ -352,7 +352,7 @@ contains
             call check(error, same(client%outcomes(i), other%outcomes(i)), 'another case was disturbed')
          end select
          if (.not. allocated(error)) &
-            call check(error, other%outcomes(i)%gave_up .eqv. any(i == [2, 5, 7]), 'the method gave up, or did not')
+            call check(error, other%outcomes(i)%has_failed .eqv. any(i == [2, 5, 7]), 'the method gave up, or did not')
          if (allocated(error)) return
       end do
    end subroutine test_failures
@@ -378,7 +378,7 @@ contains
             call check(error, message(:33), failure%message(:33), 'message') ! up to the fourth digit of the time
          end associate
          if (allocated(error)) return
-         call check(error, client%outcomes(i)%counts%n_steps == 150 .and. .not. client%outcomes(i)%gave_up, 'steps')
+         call check(error, client%outcomes(i)%counts%n_steps == 150 .and. .not. client%outcomes(i)%has_failed, 'steps')
          if (allocated(error)) return
       end do
    end subroutine test_limits

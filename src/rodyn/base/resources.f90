@@ -14,29 +14,26 @@ module rodyn_resources
    real(wp), parameter :: unknown = 1.0e300_wp
 
    interface
-      function posix_getrlimit(resource, limits) result(status) bind(c, name='getrlimit')
+      integer(c_int) function posix_getrlimit(resource, limits) bind(c, name='getrlimit')
          import :: c_int, c_int64_t
          implicit none (type, external)
          integer(c_int), intent(in), value :: resource
          integer(c_int64_t), intent(out) :: limits(2) !! soft, hard; -1: none
-         integer(c_int) :: status
       end function posix_getrlimit
 
-      function posix_setrlimit(resource, limits) result(status) bind(c, name='setrlimit')
+      integer(c_int) function posix_setrlimit(resource, limits) bind(c, name='setrlimit')
          import :: c_int, c_int64_t
          implicit none (type, external)
          integer(c_int), intent(in), value :: resource
          integer(c_int64_t), intent(in) :: limits(2)
-         integer(c_int) :: status
       end function posix_setrlimit
 
       ! struct statvfs has 11 words and 6 spare integers on 64-bit Linux
-      function posix_statvfs(path, words) result(status) bind(c, name='statvfs')
+      integer(c_int) function posix_statvfs(path, words) bind(c, name='statvfs')
          import :: c_char, c_int, c_int64_t
          implicit none (type, external)
          character(kind=c_char), intent(in) :: path(*)
          integer(c_int64_t), intent(out) :: words(32)
-         integer(c_int) :: status
       end function posix_statvfs
    end interface
 

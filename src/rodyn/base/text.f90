@@ -6,7 +6,7 @@ module rodyn_text
    private
    public :: lower, is_name, is_digit
    public :: to_text, formatted, tidy, plain_text, short_text, time_text, quoted, printable, as_utf8, ends_with
-   public :: edit_distance, word_count, has_word, word
+   public :: edit_distance, word_count, has_word, word, joined, with_line_ends, text_or_empty
 
    !> A number as the shortest text (integer), or with 17 significant digits (real), or as T or F.
    interface to_text
@@ -178,20 +178,56 @@ contains
    end function has_word
 
    !> Word `k` of a list such as 'free|fixed'.
-   pure function word(list, k) result(text)
+   pure function word(list, k, between) result(text)
       character(len=*), intent(in) :: list
       integer, intent(in) :: k
+      character(len=1), intent(in), optional :: between !! what stands between words; absent: '|'
       character(len=:), allocatable :: text
+      character(len=1) :: mark
       integer :: i, first, last
 
+      mark = '|'
+      if (present(between)) mark = between
       first = 1
       do i = 2, k
-         first = first + index(list(first:), '|')
+         first = first + index(list(first:), mark)
       end do
-      last = index(list(first:), '|') + first - 2
+      last = index(list(first:), mark) + first - 2
       if (last < first) last = len_trim(list)
       text = list(first:last)
    end function word
+
+   !> Two texts, each of which may be empty, and what stands between them if neither is.
+   pure function joined(first, second, between) result(text)
+      character(len=*), intent(in) :: first, second, between
+      character(len=:), allocatable :: text
+      text = first//second
+      if (len(first) > 0 .and. len(second) > 0) text = first//between//second
+   end function joined
+
+   !> A text of several lines with something else in the place of their ends.
+   pure function with_line_ends(text, mark) result(lines)
+      character(len=*), intent(in) :: text, mark
+      character(len=:), allocatable :: lines
+      integer :: i
+
+      lines = ''
+      do i = 1, len(text)
+         if (text(i:i) == new_line('a')) then
+            lines = lines//mark
+         else
+            lines = lines//text(i:i)
+         end if
+      end do
+   end function with_line_ends
+
+   !> A text that may not be there.
+   pure function text_or_empty(text) result(value)
+      character(len=:), allocatable, intent(in) :: text
+      character(len=:), allocatable :: value
+      value = ''
+      if (allocated(text)) value = text
+   end function text_or_empty
 
    !> Does a text, but for trailing blanks, end like this, with something in front?
    pure logical function ends_with(text, ending)

@@ -7,12 +7,11 @@ module rodyn_case_notes
    use rodyn_methods, only: method_named, method_type
    use rodyn_loads, only: load_set, new_load_set
    use rodyn_switch_times, only: same_time
-   use rodyn_text, only: formatted, tidy, to_text
+   use rodyn_text, only: formatted, joined, tidy, to_text
    implicit none (type, external)
    private
-   public :: case_notes, degrees_note, joined_lines
+   public :: case_notes, degrees_note
 
-   character(len=1), parameter :: nl = new_line('a')
    real(wp), parameter :: pi = acos(-1.0_wp)
 
 contains
@@ -47,17 +46,8 @@ contains
    subroutine add(text, note)
       character(len=:), allocatable, intent(inout) :: text
       character(len=*), intent(in) :: note
-      if (len(text) > 0) text = text//nl
-      text = text//note
+      text = joined(text, note, new_line('a'))
    end subroutine add
-
-   !> Two texts of some lines or none, one under the other.
-   pure function joined_lines(first, second) result(text)
-      character(len=*), intent(in) :: first, second
-      character(len=:), allocatable :: text
-      text = first//second
-      if (len(first) > 0 .and. len(second) > 0) text = first//nl//second
-   end function joined_lines
 
    !> A number with six digits, without idle zeros.
    pure function number(x) result(text)

@@ -4,7 +4,7 @@ module rodyn_case_writer
    use rodyn_case_config, only: case_config, visit_case
    use rodyn_field_visitor, only: field_visitor
    use rodyn_schema, only: schema_group, schema_row, name_length, satisfies
-   use rodyn_text, only: quoted, to_text
+   use rodyn_text, only: quoted, text_or_empty, to_text
    use rodyn_text_buffer, only: text_buffer
    implicit none (type, external)
    private
@@ -130,11 +130,7 @@ contains
       class(case_writer), intent(inout) :: self
       character(len=:), allocatable, intent(inout) :: x
       type(schema_row), intent(in) :: row
-      if (allocated(x)) then
-         call put(self, row, quoted(x))
-      else
-         call put(self, row, quoted(''))
-      end if
+      call put(self, row, quoted(text_or_empty(x)))
    end subroutine text_field
 
 end module rodyn_case_writer

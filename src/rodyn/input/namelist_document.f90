@@ -79,14 +79,9 @@ contains
       type(namelist_document), intent(inout) :: document
       character(len=*), intent(in) :: name
       integer, intent(in) :: line
-      type(namelist_group), allocatable :: larger(:)
 
       if (.not. allocated(document%groups)) allocate (document%groups(8))
-      if (document%n_groups == size(document%groups)) then
-         allocate (larger(2*document%n_groups))
-         larger(:document%n_groups) = document%groups
-         call move_alloc(larger, document%groups)
-      end if
+      if (document%n_groups == size(document%groups)) document%groups = [document%groups, document%groups] ! twice the room
       document%n_groups = document%n_groups + 1
       document%groups(document%n_groups) = namelist_group(lower(name), line, first=document%n_entries + 1, &
          last=document%n_entries)
@@ -96,15 +91,10 @@ contains
    subroutine add_entry(document, entry)
       type(namelist_document), intent(inout) :: document
       type(namelist_entry), intent(in) :: entry
-      type(namelist_entry), allocatable :: larger(:)
       integer :: n
 
       if (.not. allocated(document%entries)) allocate (document%entries(32))
-      if (document%n_entries == size(document%entries)) then
-         allocate (larger(2*document%n_entries))
-         larger(:document%n_entries) = document%entries
-         call move_alloc(larger, document%entries)
-      end if
+      if (document%n_entries == size(document%entries)) document%entries = [document%entries, document%entries] ! twice the room
       n = document%n_entries + 1
       document%n_entries = n
       document%entries(n) = entry
@@ -117,14 +107,9 @@ contains
    subroutine add_value(document, value)
       type(namelist_document), intent(inout) :: document
       type(namelist_value), intent(in) :: value
-      type(namelist_value), allocatable :: larger(:)
 
       if (.not. allocated(document%values)) allocate (document%values(64))
-      if (document%n_values == size(document%values)) then
-         allocate (larger(2*document%n_values))
-         larger(:document%n_values) = document%values
-         call move_alloc(larger, document%values)
-      end if
+      if (document%n_values == size(document%values)) document%values = [document%values, document%values] ! twice the room
       document%n_values = document%n_values + 1
       document%values(document%n_values) = value
       document%entries(document%n_entries)%last = document%n_values

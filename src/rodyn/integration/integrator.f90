@@ -43,7 +43,7 @@ module rodyn_integrator
    !> Someone who watches a run: called about five times a second of wall time.
    type, abstract :: monitor_type
    contains
-      procedure(report_interface), deferred :: report
+      procedure :: report
       procedure :: stop_requested
    end type monitor_type
 
@@ -80,15 +80,6 @@ module rodyn_integrator
    end type integrator_type
 
    abstract interface
-      !> A sign of life.
-      subroutine report_interface(self, t, n_steps)
-         import :: monitor_type, wp, i8
-         implicit none (type, external)
-         class(monitor_type), intent(inout) :: self
-         real(wp), intent(in) :: t          !! simulated time reached [s]
-         integer(i8), intent(in) :: n_steps !! internal steps so far
-      end subroutine report_interface
-
       !> First start, and every exact restart: forget the history and begin at (t, y). `set_stop` comes before.
       subroutine start_interface(self, t, y, error)
          import :: integrator_type, error_type, wp
@@ -146,6 +137,14 @@ contains
       inner%rtol = share*options%rtol
       inner%atol = share*options%atol
    end function tightened
+
+   !> How far the run has come: nothing is made of it, unless a monitor says otherwise.
+   subroutine report(self, t, n_steps)
+      class(monitor_type), intent(inout) :: self
+      real(wp), intent(in) :: t          !! simulated time reached [s]
+      integer(i8), intent(in) :: n_steps !! internal steps so far
+      associate (unused => self, unused_t => t, unused_n => n_steps); end associate
+   end subroutine report
 
    !> Never, unless a monitor says otherwise. When true, `advance` ends with exit code `exit_stopped`.
    function stop_requested(self) result(requested)

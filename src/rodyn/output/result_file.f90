@@ -12,9 +12,10 @@ module rodyn_result_file
    use rodyn_posix, only: host_name, ignore_signal, is_directory, is_special, is_writable, last_failure, parent_directory, &
       path_exists, posix_close, process_id, remove_file, rename_new, rename_over, sigxfsz, sync_path, utc_now
    use rodyn_posix_files, only: create_file, make_directory
+   use rodyn_text, only: text_or_empty
    implicit none (type, external)
    private
-   public :: provenance, result_file, check_output_path, text_or_empty
+   public :: provenance, result_file, check_output_path
 
    integer, parameter :: longest_name = 255 - 24, longest_path = 4095 - 24 !! of Linux, less what temporary names add [bytes]
 
@@ -283,13 +284,5 @@ contains
       call get_environment_variable('TMPDIR', path)
       if (length == 0) path = '/tmp'
    end function temporary_directory
-
-   !> A text that may not be there.
-   pure function text_or_empty(text) result(value)
-      character(len=:), allocatable, intent(in) :: text
-      character(len=:), allocatable :: value
-      value = ''
-      if (allocated(text)) value = text
-   end function text_or_empty
 
 end module rodyn_result_file

@@ -18,8 +18,8 @@ module rodyn_run_file
    use rodyn_methods, only: solver_options
    use rodyn_posix, only: path_exists, remove_file
    use rodyn_quantities, only: chain_axes, entries, row_layout, row_type
-   use rodyn_result_file, only: check_output_path, provenance, result_file, text_or_empty
-   use rodyn_text, only: short_text, to_text
+   use rodyn_result_file, only: check_output_path, provenance, result_file
+   use rodyn_text, only: short_text, text_or_empty, to_text
    implicit none (type, external)
    private
    public :: run_file, run_header, solver_report, check_output_path

@@ -3,7 +3,7 @@ module rodyn_command_line
    use rodyn_errors, only: error_type, raise, exit_done, exit_bad_input
    use rodyn_case_config, only: case_config
    use rodyn_case_reader, only: case_from_document, default_case
-   use rodyn_case_notes, only: case_notes, degrees_note, joined_lines
+   use rodyn_case_notes, only: case_notes, degrees_note
    use rodyn_input_texts, only: input_texts, is_result_file, is_stream, read_input_texts
    use rodyn_launcher, only: direct_launch, launch_type
    use rodyn_modal_analysis, only: analyse_modes
@@ -17,7 +17,7 @@ module rodyn_command_line
    use rodyn_sweep_plan, only: new_plan, sweep_plan
    use rodyn_sweep_reader, only: default_sweep, parse_sweep
    use rodyn_terminal, only: print_error_line
-   use rodyn_text, only: as_utf8, to_text
+   use rodyn_text, only: as_utf8, joined, to_text, with_line_ends
    use rodyn_build_info, only: program_version, git_commit
    implicit none (type, external)
    private
@@ -191,7 +191,8 @@ contains
       type(sweep_plan) :: plan
       type(scene_type) :: scene
       type(input_texts) :: input
-      character(len=:), allocatable :: name
+      character(len=*), parameter :: mark = 'note    '
+      character(len=:), allocatable :: name, notes
 
       call read_input_texts(options%file, input, error)
       if (allocated(error)) return
@@ -208,8 +209,13 @@ contains
       end if
       if (allocated(error) .or. options%quiet) return
       name = name//': valid'
-      if (input%is_sweep) name = name//sweep%tried//marked('note    ', sweep_notes(sweep))
-      if (.not. input%is_sweep) name = name//marked('note    ', case_notes(config, .true.))
+      if (input%is_sweep) then
+         name = name//sweep%tried
+         notes = sweep_notes(sweep)
+      else
+         notes = case_notes(config, .true.)
+      end if
+      if (len(notes) > 0) name = name//nl//mark//with_line_ends(notes, nl//mark)
       call print_text(name, error)
    end subroutine check_command
 
@@ -223,24 +229,10 @@ contains
       do i = 1, size(sweep%axes)
          associate (axis => sweep%axes(i))
             if (axis%unit == 'rad' .and. .not. axis%textual) &
-               text = joined_lines(text, degrees_note('axis '//trim(axis%key), axis%numbers))
+               text = joined(text, degrees_note('axis '//trim(axis%key), axis%numbers), nl)
          end associate
       end do
    end function sweep_notes
-
-   !> Each line of a text on a new line and behind a mark.
-   pure function marked(mark, text) result(lines)
-      character(len=*), intent(in) :: mark, text
-      character(len=:), allocatable :: lines
-      integer :: i
-
-      lines = ''
-      if (len(text) > 0) lines = nl//mark
-      do i = 1, len(text)
-         lines = lines//text(i:i)
-         if (text(i:i) == nl) lines = lines//mark
-      end do
-   end function marked
 
    !> rodyn sweep
    subroutine sweep_command(options, exit_code, error)

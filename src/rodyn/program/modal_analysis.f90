@@ -3,7 +3,7 @@ module rodyn_modal_analysis
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: case_config
    use rodyn_case_check, only: sound_case
-   use rodyn_case_notes, only: case_notes, joined_lines
+   use rodyn_case_notes, only: case_notes
    use rodyn_case_reader, only: resolved_case
    use rodyn_errors, only: error_type
    use rodyn_integrators, only: sundials_version
@@ -16,7 +16,7 @@ module rodyn_modal_analysis
    use rodyn_run_needs, only: check_memory, memory_of_scene, of_program
    use rodyn_run_setup, only: run_setup, new_run_setup
    use rodyn_terminal, only: print_line
-   use rodyn_text, only: formatted, to_text
+   use rodyn_text, only: formatted, joined, to_text
    implicit none (type, external)
    private
    public :: analyse_modes
@@ -60,7 +60,7 @@ contains
       origin%sundials_version = sundials_version()
       if (present(input_text)) origin%input = input_text
       associate (scene => setup%motion%dynamics%scene, hinges => setup%motion%dynamics%hinges)
-         origin%notes = joined_lines(case_notes(config, .false.), notes_on(scene, hinges, model%q(:scene%n_dof), .false.))
+         origin%notes = joined(case_notes(config, .false.), notes_on(scene, hinges, model%q(:scene%n_dof), .false.), new_line('a'))
          call write_modes(path, replace, origin, scene, hinges, model, modes, equilibrium, error)
       end associate
       if (allocated(error) .or. silent) return

@@ -2,11 +2,11 @@
 module rodyn_run
    use rodyn_kinds, only: wp, i8
    use rodyn_terminal, only: print_line
-   use rodyn_text, only: formatted, to_text, time_text
+   use rodyn_text, only: formatted, joined, text_or_empty, time_text, to_text, with_line_ends
    use rodyn_errors, only: error_type, raise, exit_stopped
    use rodyn_case_config, only: case_config
    use rodyn_case_check, only: sound_case
-   use rodyn_case_notes, only: case_notes, joined_lines
+   use rodyn_case_notes, only: case_notes
    use rodyn_case_reader, only: resolved_case
    use rodyn_motion, only: motion_type, state_invariants
    use rodyn_kinematics, only: invariants_type
@@ -87,7 +87,8 @@ contains
       if (allocated(error) .and. present(name)) error%message = name//': '//error%message
       if (allocated(error)) return
       associate (scene => setup%motion%dynamics%scene, hinges => setup%motion%dynamics%hinges)
-         notes = joined_lines(case_notes(config, .true.), notes_on(scene, hinges, setup%y(:scene%n_dof), config%output%ledger))
+         notes = joined(case_notes(config, .true.), notes_on(scene, hinges, setup%y(:scene%n_dof), config%output%ledger), &
+                        new_line('a'))
          if (.not. silent) call print_line(describe_scene(scene, config%output%ledger))
       end associate
       if (.not. silent) call print_line('method  '//driver%methods()//': '//driver%reason())
@@ -135,8 +136,7 @@ contains
       character(len=*), intent(in), optional :: input_text
       type(run_header) :: header
 
-      header%title = ''
-      if (allocated(config%title)) header%title = config%title
+      header%title = text_or_empty(config%title)
       header%input = ''
       if (present(input_text)) header%input = input_text
       header%resolved_input = resolved_case(config)
@@ -283,15 +283,7 @@ contains
    !> Each line of a text behind a word.
    subroutine print_lines(word, text)
       character(len=*), intent(in) :: word, text
-      integer :: first, last
-
-      first = 1
-      do while (first <= len(text))
-         last = index(text(first:), new_line('a')) + first - 2
-         if (last < first) last = len(text)
-         call print_line(word//' '//text(first:last))
-         first = last + 2
-      end do
+      if (len(text) > 0) call print_line(word//' '//with_line_ends(text, new_line('a')//word//' '))
    end subroutine print_lines
 
    !> Last lines on the terminal.

@@ -12,7 +12,7 @@ module rodyn_driver
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type, exit_stopped
    use rodyn_case_config, only: solver_config
-   use rodyn_text, only: time_text
+   use rodyn_text, only: joined, time_text
    use rodyn_integrator, only: integrator_type, monitor_type, solver_options, solver_statistics
    use rodyn_integrators, only: new_integrator
    use rodyn_method_choice, only: method_choice, choose_method, named_method
@@ -26,11 +26,12 @@ module rodyn_driver
    public :: driver_type, new_driver
 
    integer, parameter :: most_lines = 12          !! of the history
+   character(len=1), parameter :: nl = new_line('a')
 
    !> A method that may take part. Made when it is first needed.
    type :: member_type
       class(integrator_type), allocatable :: integrator
-      logical :: gave_up = .false.
+      logical :: has_failed = .false.
    end type member_type
 
    !> What was chosen for some hinge laws.
@@ -144,15 +145,15 @@ contains
       integer :: i
 
       t_until = min(self%t_end, motion%dynamics%hinges%next_release(t))
-      out = self%members%gave_up
+      out = self%members%has_failed
       call choose_method(choice, self%options, motion, y(:motion%n_controlled), t, t_until, &
                          nint(self%n_outputs*((t_until - t)/self%t_end)), out, most_trial(self), self%monitor)
       if (self%n_choices > 0) self%tried = self%tried + choice%effort + effort_of_rates
       self%n_choices = self%n_choices + 1
       self%is_delayed = .not. choice%conclusive
       if (self%is_delayed) self%next_choice = postponed*effort_of_run(self)
-      member = findloc(self%members%gave_up, .false., dim=1)
-      if (.not. self%members(choice%candidate)%gave_up) member = choice%candidate
+      member = findloc(self%members%has_failed, .false., dim=1)
+      if (.not. self%members(choice%candidate)%has_failed) member = choice%candidate
       self%pace = 0.0_wp
       if (self%is_delayed) return
       past = past_choice(motion%dynamics%hinges%mechanisms%law_number(), member, choice%reason(), &
@@ -171,7 +172,7 @@ contains
    real(wp) function most_trial(self)
       type(driver_type), intent(inout) :: self
       most_trial = huge(1.0_wp)
-      if (self%n_choices > 0 .and. .not. self%members(explicit)%gave_up) &
+      if (self%n_choices > 0 .and. .not. self%members(explicit)%has_failed) &
          most_trial = max(trials_free, trials_free + trial_share*effort_of_run(self) - self%tried)
    end function most_trial
 
@@ -191,7 +192,7 @@ contains
       type(driver_type), intent(in) :: self
       known_choice = place_of(self, self%motion%dynamics%hinges%mechanisms%law_number())
       if (known_choice == 0) return
-      if (self%members(self%past_choices(known_choice)%member)%gave_up) known_choice = 0
+      if (self%members(self%past_choices(known_choice)%member)%has_failed) known_choice = 0
    end function known_choice
 
    !> First start, or exact restart; before it, the method that fits what begins here.
@@ -223,7 +224,7 @@ contains
       if (known > 0) member = self%past_choices(known)%member
       if (known > 0 .and. (self%timed .or. member <= n_even)) then
          call follow(self, known, member)
-      else if ((self%timed .and. may_choose(self)) .or. self%members(explicit)%gave_up) then
+      else if ((self%timed .and. may_choose(self)) .or. self%members(explicit)%has_failed) then
          call judge_here(self, member)
       else
          self%is_delayed = .true.
@@ -261,24 +262,17 @@ contains
    pure logical function last_is_clear(self)
       type(driver_type), intent(in) :: self
       last_is_clear = size(self%past_choices) > 0
-      if (last_is_clear) last_is_clear = self%past_choices(1)%clear .and. .not. self%members(self%past_choices(1)%member)%gave_up
+      if (last_is_clear) last_is_clear = self%past_choices(1)%clear .and. .not. self%members(self%past_choices(1)%member)%has_failed
    end function last_is_clear
 
    !> One more line of the history.
-   subroutine tell(self, line)
+   subroutine add_to_history(self, line)
       type(driver_type), intent(inout) :: self
       character(len=*), intent(in) :: line
-      if (self%n_lines < most_lines) call append_line(self%history, line)
-      if (self%n_lines == most_lines) call append_line(self%history, 'and further changes of the method')
+      if (self%n_lines < most_lines) self%history = joined(self%history, line, nl)
+      if (self%n_lines == most_lines) self%history = joined(self%history, 'and further changes of the method', nl)
       self%n_lines = self%n_lines + 1
-   end subroutine tell
-
-   subroutine append_line(text, line)
-      character(len=:), allocatable, intent(inout) :: text
-      character(len=*), intent(in) :: line
-      if (len(text) > 0) text = text//new_line('a')
-      text = text//line
-   end subroutine append_line
+   end subroutine add_to_history
 
    !> Start a member at the last good state; where it fails, another.
    subroutine start_member(self, member, error)
@@ -286,8 +280,8 @@ contains
       integer, value :: member
       type(error_type), allocatable, intent(out) :: error
 
-      if (self%begun .and. self%name(member) /= self%name(self%now) .and. .not. self%members(self%now)%gave_up) &
-         call tell(self, 'from t = '//time_text(self%t_last)//' s '//self%name(member)//': '//self%why)
+      if (self%begun .and. self%name(member) /= self%name(self%now) .and. .not. self%members(self%now)%has_failed) &
+         call add_to_history(self, 'from t = '//time_text(self%t_last)//' s '//self%name(member)//': '//self%why)
       do
          call switch_to(self, member, error)
          if (.not. allocated(error)) then
@@ -302,8 +296,7 @@ contains
       end do
       self%begun = .true.
       if (index(self%used, self%name(member)) > 0) return
-      if (len(self%used) > 0) self%used = self%used//', '
-      self%used = self%used//self%name(member)
+      self%used = joined(self%used, self%name(member), ', ')
    end subroutine start_member
 
    !> Make the integrator of a method that the case names, which may not know how to integrate it: an error before the run.
@@ -447,7 +440,7 @@ contains
       character(len=:), allocatable :: line
       integer :: i
 
-      self%members(member)%gave_up = .true.
+      self%members(member)%has_failed = .true.
       self%is_delayed = .false.
       if (allocated(self%cause)) then
          if (self%t_last > self%t_cause) deallocate (self%cause)
@@ -464,15 +457,15 @@ contains
       deallocate (error)
       call judge_here(self, member)
       line = line//'from t = '//time_text(self%t_last)//' s '//self%name(member)
-      call append_line(self%failures, line)
-      call tell(self, line)
+      self%failures = joined(self%failures, line, nl)
+      call add_to_history(self, line)
    end subroutine replace
 
    !> Whether a candidate may be started now.
    logical function suits(self, member)
       type(driver_type), intent(in) :: self
       integer, intent(in) :: member
-      suits = .not. self%members(member)%gave_up
+      suits = .not. self%members(member)%has_failed
       if (member == collocation) suits = suits .and. self%motion%has_lanes()
    end function suits
 
@@ -512,8 +505,7 @@ contains
    function reason(self) result(text)
       class(driver_type), intent(in) :: self
       character(len=:), allocatable :: text
-      text = self%choice%reason()
-      if (len(self%history) > 0) text = text//new_line('a')//self%history
+      text = joined(self%choice%reason(), self%history, nl)
    end function reason
 
    !> A time that was known before.

@@ -21,7 +21,6 @@ module rodyn_method_trial
    type, extends(monitor_type) :: trial_monitor
       class(monitor_type), pointer :: outer => null()
    contains
-      procedure :: report
       procedure :: stop_requested
    end type trial_monitor
 
@@ -450,14 +449,6 @@ contains
       call self%motion%respond(self%reached, self%integrator%crossed, y, error)
       if (.not. allocated(error)) call self%integrator%start(self%reached, y, error)
    end subroutine pass_event
-
-   !> Nothing.
-   subroutine report(self, t, n_steps)
-      class(trial_monitor), intent(inout) :: self
-      real(wp), intent(in) :: t
-      integer(i8), intent(in) :: n_steps
-      associate (unused => self, unused_t => t, unused_n => n_steps); end associate
-   end subroutine report
 
    function stop_requested(self) result(requested)
       class(trial_monitor), intent(in) :: self

@@ -30,11 +30,10 @@ module rodyn_progress
 
    interface
       !> POSIX: 1 if the descriptor is a terminal.
-      function c_isatty(descriptor) result(answer) bind(c, name='isatty')
+      integer(c_int) function c_isatty(descriptor) bind(c, name='isatty')
          import :: c_int
          implicit none (type, external)
          integer(c_int), intent(in), value :: descriptor
-         integer(c_int) :: answer
       end function c_isatty
    end interface
 

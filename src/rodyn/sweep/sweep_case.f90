@@ -24,11 +24,11 @@ module rodyn_sweep_case
    use rodyn_sweep_config, only: sweep_axis, sweep_config, is_ratio, short_value_text
    use rodyn_sweep_plan, only: sweep_plan
    use rodyn_validity, only: validity_type, new_validity
-   use rodyn_text, only: short_text
+   use rodyn_text, only: joined, short_text, with_line_ends
    implicit none (type, external)
    private
    public :: case_result, case_shape, poller_type, keeper_type, build_case, build_values, new_case_shape
-   public :: allocate_result, clear_result, prepare_case, integrate_case, keep_final, conclude_case
+   public :: allocate_result, clear_result, make_nan, prepare_case, integrate_case, keep_final, conclude_case
    public :: status_done, status_failed, status_stopped
 
    integer, parameter :: status_done = 1, status_failed = 2
@@ -83,7 +83,6 @@ module rodyn_sweep_case
       real(wp) :: limit = 0.0_wp !! wall time [s]; 0: none
       logical, pointer :: late => null()
    contains
-      procedure :: report
       procedure :: stop_requested
    end type case_monitor
 
@@ -352,7 +351,7 @@ contains
       keeper%kept%n_rhs = stats%n_rhs
       if (.not. allocated(error)) call keep_final(setup, keeper, error)
       if (.not. allocated(error) .and. len(driver%failures) > 0) keeper%kept%message = &
-         in_one_line(joined(driver%failures, keeper%kept%message))
+         with_line_ends(joined(driver%failures, keeper%kept%message, '; '), '; ')
       call driver%finalize()
    end subroutine integrate_case
 
@@ -369,33 +368,9 @@ contains
       call setup%motion%dynamics%move_kinks(setup%t_end)
       call fill_row(setup%motion, setup%t_end, setup%y, 0.0_wp, keeper%row)
       call keeper%validity%observe(keeper%row)
-      keeper%kept%message = in_one_line(keeper%validity%warnings())
+      keeper%kept%message = with_line_ends(keeper%validity%warnings(), '; ') ! a message has no line ends
       call place(keeper%row, keeper%layout, keeper%kept%final)
    end subroutine keep_final
-
-   !> Two texts, each of which may be empty.
-   pure function joined(a, b) result(text)
-      character(len=*), intent(in) :: a, b
-      character(len=:), allocatable :: text
-      text = a//b
-      if (len(a) > 0 .and. len(b) > 0) text = a//'; '//b
-   end function joined
-
-   !> A message has no line ends.
-   pure function in_one_line(lines) result(text)
-      character(len=*), intent(in) :: lines
-      character(len=:), allocatable :: text
-      integer :: i
-
-      text = ''
-      do i = 1, len(lines)
-         if (lines(i:i) == new_line('a')) then
-            text = text//'; '
-         else
-            text = text//lines(i:i)
-         end if
-      end do
-   end function in_one_line
 
    !> Status and message of a case that has ended. Nothing that happens to a case is an error of the sweep.
    subroutine conclude_case(sweep, keeper, late, error, kept)
@@ -526,14 +501,6 @@ contains
       monitor%limit = sweep%case_seconds
       monitor%late => late
    end function new_monitor
-
-   !> Nothing: the sweep has a progress of its own.
-   subroutine report(self, t, n_steps)
-      class(case_monitor), intent(inout) :: self
-      real(wp), intent(in) :: t
-      integer(i8), intent(in) :: n_steps
-      associate (unused => self, unused_t => t, unused_n => n_steps); end associate
-   end subroutine report
 
    !> Has someone asked the sweep to stop, or has this case used up its wall time?
    function stop_requested(self) result(requested)

@@ -11,7 +11,7 @@ module rodyn_sweep_journal
    use rodyn_file_text, only: read_text_file
    use rodyn_posix, only: host_name, path_exists, process_id, utc_now
    use rodyn_posix_files, only: append_text, list_directory
-   use rodyn_text, only: to_text
+   use rodyn_text, only: to_text, word
    implicit none (type, external)
    private
    public :: write_journal, read_journals, journal_content
@@ -118,13 +118,13 @@ contains
       class(journal_content), intent(inout) :: self
       character(len=*), intent(in) :: line
 
-      select case (field(line, 4))
+      select case (word(line, 4, ' '))
       case ('sealed')
-         call push(self%sealed, self%n_sealed, field(line, 5))
+         call push(self%sealed, self%n_sealed, word(line, 5, ' '))
       case ('aside', 'gone')
-         call push(self%away, self%n_away, field(line, 5))
+         call push(self%away, self%n_away, word(line, 5, ' '))
       case ('merged')
-         call push(self%merged, self%n_merged, field(line, 7))
+         call push(self%merged, self%n_merged, word(line, 7, ' '))
       case default ! an event of a later version
       end select
    end subroutine take
@@ -133,30 +133,9 @@ contains
       character(len=name_length), allocatable, intent(inout) :: list(:)
       integer, intent(inout) :: n
       character(len=*), intent(in) :: name
-      character(len=name_length), allocatable :: larger(:)
-      if (n == size(list)) then
-         allocate (larger(2*n))
-         larger(:n) = list
-         call move_alloc(larger, list)
-      end if
+      if (n == size(list)) list = [list, list]
       n = n + 1
       list(n) = name
    end subroutine push
-
-   !> Field number `k` of a line of blank-separated ones.
-   pure function field(line, k) result(text)
-      character(len=*), intent(in) :: line
-      integer, intent(in) :: k
-      character(len=:), allocatable :: text
-      integer :: first, i, length
-
-      first = 1
-      do i = 2, k
-         first = first + index(line(first:), ' ')
-      end do
-      length = index(line(first:), ' ') - 1
-      if (length < 0) length = len(line) - first + 1
-      text = line(first:first + length - 1)
-   end function field
 
 end module rodyn_sweep_journal

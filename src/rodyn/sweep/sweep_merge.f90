@@ -2,7 +2,6 @@
 !>
 !> What is in it depends on the sweep alone, not on who computed which case when; only `wall_seconds` differs.
 module rodyn_sweep_merge
-   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    use rodyn_kinds, only: wp, i8
    use rodyn_build_info, only: compiler, compiler_options, git_commit, program_version
    use rodyn_case_reader, only: resolved_case
@@ -11,7 +10,7 @@ module rodyn_sweep_merge
    use rodyn_integrators, only: sundials_version
    use rodyn_posix, only: ignore_signal, path_exists, remove_file, sigxfsz, sync_path
    use rodyn_quantities, only: chain_axes, entries, quantity
-   use rodyn_sweep_case, only: allocate_result, case_result, case_shape, status_done
+   use rodyn_sweep_case, only: allocate_result, case_result, case_shape, make_nan, status_done
    use rodyn_sweep_config, only: sweep_config
    use rodyn_sweep_index, only: sweep_index
    use rodyn_sweep_plan, only: sweep_plan
@@ -73,7 +72,7 @@ contains
       failure = remove_file(path)
    end subroutine merge_sweep
 
-   !> Layout, then blocks of cases, then what coordinates belong to.
+   !> Layout, then blocks of cases.
    subroutine write_all(file, sweep, plan, shape, index, error)
       type(hdf5_file), intent(inout) :: file
       type(sweep_config), intent(in) :: sweep
@@ -98,7 +97,6 @@ contains
          call append_block(file, block, shape)
          call append_parameters(file, sweep, plan, first, n)
       end do
-      call attach_all(file, sweep, shape)
    end subroutine write_all
 
    !> As many cases as the memory for a block allows.
@@ -134,23 +132,14 @@ contains
       type(sweep_index), intent(inout) :: index
       integer, intent(in) :: first, n
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: nan
       integer :: i, source
 
-      nan = ieee_value(0.0_wp, ieee_quiet_nan)
       block%n = n
       do i = 1, n
          source = plan%same_as(first + i - 1)
          call index%fetch(source, shape, kept, error)
          if (allocated(error)) return
-         if (kept%status /= status_done) then
-            kept%frequency = nan
-            kept%damping_ratio = nan
-            kept%final = nan
-            kept%probes = nan
-            kept%times = nan
-            kept%series = nan
-         end if
+         if (kept%status /= status_done) call make_nan(kept)
          block%frequency(:, i) = kept%frequency
          block%damping_ratio(:, i) = kept%damping_ratio
          block%final(:, i) = kept%final
@@ -196,12 +185,14 @@ contains
 
    end subroutine write_header
 
-   !> All data sets that grow with the cases, empty; coordinates.
+   !> Coordinates, and all data sets that grow with the cases, empty: dimension scales, as xarray wants them, are attached.
    subroutine write_layout(file, sweep, shape, block_cases, message_length)
       type(hdf5_file), intent(inout) :: file
       type(sweep_config), intent(in) :: sweep
       type(case_shape), intent(in) :: shape
       integer, intent(in) :: block_cases, message_length
+      integer, parameter :: no_rows(0) = [integer ::]
+      character(len=1), parameter :: no_scales(0) = [character(len=1) ::]
       character(len=:), allocatable :: state
       integer :: a, compression, i
 
@@ -209,48 +200,48 @@ contains
 
       if (shape%layout%n_values > 0) then
          call file%write('probe_time', sweep%probe_times, compression)
-         call describe('probe_time', 's', 'time at which the state of each case is kept')
+         call describe_scale('probe_time', 's', 'time at which the state of each case is kept')
       end if
       do i = 1, size(chain_axes)
          if (.not. shape%layout%counts(i)) cycle
-         call file%write(trim(chain_axes(i)%name), entries(chain_axes(i), shape%layout%n_rods), &
-                         compression)
-         call describe(trim(chain_axes(i)%name), '1', trim(chain_axes(i)%long_name))
+         call file%write(trim(chain_axes(i)%name), entries(chain_axes(i), shape%layout%n_rods), compression)
+         call describe_scale(trim(chain_axes(i)%name), '1', trim(chain_axes(i)%long_name))
       end do
       if (shape%n_modes > 0) then
          call file%write('mode', [(i, i=1, shape%n_modes)], compression)
-         call describe('mode', '1', 'oscillation, by rising natural frequency')
+         call describe_scale('mode', '1', 'oscillation, by rising natural frequency')
       end if
       if (shape%n_rows > 0) then
          call file%write('row', [(i - 1, i=1, shape%n_rows)], compression)
-         call describe('row', '1', 'output time of a case, counted from its start')
+         call describe_scale('row', '1', 'output time of a case, counted from its start')
       end if
-      call make('case', [integer ::], 'integer', '1', 'case; the last axis runs fastest')
+      call file%create_series('case', [integer ::], block_cases, compression, .true.)
+      call describe_scale('case', '1', 'case; the last axis runs fastest')
       do a = 1, size(sweep%axes)
          if (sweep%axes(a)%textual) then
             call make_texts(parameter_name(a), maxval(len_trim(sweep%axes(a)%texts)), 'value of '//trim(sweep%axes(a)%key))
          else
-            call make(parameter_name(a), [integer ::], 'real', unit_or_one(sweep%axes(a)%unit), &
+            call make(parameter_name(a), no_rows, no_scales, 'real', unit_or_one(sweep%axes(a)%unit), &
                       'value of '//trim(sweep%axes(a)%key))
          end if
       end do
       call make_texts('status', len('failed'), 'done or failed')
       call make_texts('message', message_length, 'why the case failed; or which methods gave up, and warnings on its model')
-      call make('t_reached', [integer ::], 'real', 's', 'time of the last output before it failed; of a done case its end')
-      call make('n_steps', [integer ::], 'integer', '1', 'internal steps')
-      call make('n_rhs', [integer ::], 'integer', '1', 'right-hand-side evaluations')
-      call make('same_as', [integer ::], 'integer', '1', 'first case with the same values, the one that was computed')
-      call make('wall_seconds', [integer ::], 'real', 's', 'wall time of the case')
+      call make('t_reached', no_rows, no_scales, 'real', 's', 'time of the last output before it failed; of a done case its end')
+      call make('n_steps', no_rows, no_scales, 'integer', '1', 'internal steps')
+      call make('n_rhs', no_rows, no_scales, 'integer', '1', 'right-hand-side evaluations')
+      call make('same_as', no_rows, no_scales, 'integer', '1', 'first case with the same values, the one that was computed')
+      call make('wall_seconds', no_rows, no_scales, 'real', 's', 'wall time of the case')
       if (shape%n_modes > 0) then
          state = 'at the initial state'
          if (sweep%frequencies_at == 'equilibrium') state = 'at the equilibrium'
-         call make('frequency', [shape%n_modes], 'real', 'rad s-1', 'natural frequency '//state)
-         call make('damping_ratio', [shape%n_modes], 'real', '1', 'damping ratio '//state)
+         call make('frequency', [shape%n_modes], ['mode'], 'real', 'rad s-1', 'natural frequency '//state)
+         call make('damping_ratio', [shape%n_modes], ['mode'], 'real', '1', 'damping ratio '//state)
       end if
       do i = 1, size(shape%layout%quantities)
          call make_quantity(shape%layout%quantities(i), shape%layout%row_shape(i))
       end do
-      if (shape%n_rows > 0) call make('series_time', [shape%n_rows], 'real', 's', 'output times; NaN behind the last')
+      if (shape%n_rows > 0) call make('series_time', [shape%n_rows], ['row'], 'real', 's', 'output times; NaN behind the last')
 
    contains
 
@@ -258,9 +249,15 @@ contains
       subroutine make_quantity(x, row)
          type(quantity), intent(in) :: x
          integer, intent(in) :: row(:) !! its shape
-         call make(trim(x%name), [row, shape%n_probes], 'real', trim(x%units), trim(x%long_name)//', at the probe times')
-         call make('final_'//trim(x%name), row, 'real', trim(x%units), trim(x%long_name)//', at the end of the case')
-         if (shape%n_rows > 0) call make('series_'//trim(x%name), [row, shape%n_rows], 'real', trim(x%units), trim(x%long_name))
+         character(len=10), allocatable :: along(:) !! as long as all names in the lists below
+
+         allocate (along(0))
+         if (x%along > 0) along = [character(len=10) :: chain_axes(x%along)%name]
+         call make(trim(x%name), [row, shape%n_probes], [character(len=10) :: along, 'probe_time'], 'real', trim(x%units), &
+                   trim(x%long_name)//', at the probe times')
+         call make('final_'//trim(x%name), row, along, 'real', trim(x%units), trim(x%long_name)//', at the end of the case')
+         if (shape%n_rows > 0) call make('series_'//trim(x%name), [row, shape%n_rows], [character(len=10) :: along, 'row'], &
+                                         'real', trim(x%units), trim(x%long_name))
       end subroutine make_quantity
 
       function parameter_name(a) result(name)
@@ -269,11 +266,17 @@ contains
          name = 'param_'//trim(sweep%axes(a)%key)
       end function parameter_name
 
-      subroutine make(name, row, kind_of, units, long_name)
+      subroutine make(name, row, scales, kind_of, units, long_name)
          character(len=*), intent(in) :: name, kind_of, units, long_name
-         integer, intent(in) :: row(:)
+         integer, intent(in) :: row(:)             !! shape of what a case has
+         character(len=*), intent(in) :: scales(:) !! of its dimensions
+         integer :: k
          call file%create_series(name, row, block_cases, compression, kind_of == 'integer')
          call describe(name, units, long_name)
+         do k = 1, size(scales)
+            call file%attach_scale(name, k, trim(scales(k)))
+         end do
+         call file%attach_scale(name, size(scales) + 1, 'case')
       end subroutine make
 
       subroutine make_texts(name, length, long_name)
@@ -281,7 +284,15 @@ contains
          integer, intent(in) :: length
          call file%create_texts(name, length, block_cases, compression)
          call describe(name, '', long_name)
+         call file%attach_scale(name, 1, 'case')
       end subroutine make_texts
+
+      !> Of a data set that is a coordinate of others.
+      subroutine describe_scale(name, units, long_name)
+         character(len=*), intent(in) :: name, units, long_name
+         call describe(name, units, long_name)
+         call file%make_scale(name)
+      end subroutine describe_scale
 
       subroutine describe(name, units, long_name)
          character(len=*), intent(in) :: name, units, long_name
@@ -373,63 +384,5 @@ contains
          end associate
       end do
    end subroutine append_parameters
-
-   !> Dimension scales, as xarray wants them.
-   subroutine attach_all(file, sweep, shape)
-      type(hdf5_file), intent(inout) :: file
-      type(sweep_config), intent(in) :: sweep
-      type(case_shape), intent(in) :: shape
-      character(len=*), parameter :: plain(7) = [character(len=12) :: 'status', 'message', 't_reached', 'n_steps', 'n_rhs', &
-                                                 'same_as', 'wall_seconds']
-      integer :: a, i
-
-      call file%make_scale('case')
-      if (shape%layout%n_values > 0) call file%make_scale('probe_time')
-      do i = 1, size(chain_axes)
-         if (shape%layout%counts(i)) call file%make_scale(trim(chain_axes(i)%name))
-      end do
-      if (shape%n_modes > 0) call file%make_scale('mode')
-      if (shape%n_rows > 0) call file%make_scale('row')
-      do i = 1, size(plain)
-         call file%attach_scale(trim(plain(i)), 1, 'case')
-      end do
-      do a = 1, size(sweep%axes)
-         call file%attach_scale('param_'//trim(sweep%axes(a)%key), 1, 'case')
-      end do
-      if (shape%n_modes > 0) then
-         call file%attach_scale('frequency', 1, 'mode')
-         call file%attach_scale('frequency', 2, 'case')
-         call file%attach_scale('damping_ratio', 1, 'mode')
-         call file%attach_scale('damping_ratio', 2, 'case')
-      end if
-      do i = 1, size(shape%layout%quantities)
-         call attach_quantity(trim(shape%layout%quantities(i)%name), shape%layout%quantities(i)%along)
-      end do
-      if (shape%n_rows == 0) return
-      call file%attach_scale('series_time', 1, 'row')
-      call file%attach_scale('series_time', 2, 'case')
-
-   contains
-
-      subroutine attach_quantity(name, along)
-         character(len=*), intent(in) :: name
-         integer, intent(in) :: along !! 0, or one of `chain_axes`
-         integer :: before
-
-         before = min(along, 1)
-         if (along > 0) then
-            call file%attach_scale(name, 1, trim(chain_axes(along)%name))
-            call file%attach_scale('final_'//name, 1, trim(chain_axes(along)%name))
-         end if
-         call file%attach_scale(name, before + 1, 'probe_time')
-         call file%attach_scale(name, before + 2, 'case')
-         call file%attach_scale('final_'//name, before + 1, 'case')
-         if (shape%n_rows == 0) return
-         if (along > 0) call file%attach_scale('series_'//name, 1, trim(chain_axes(along)%name))
-         call file%attach_scale('series_'//name, before + 1, 'row')
-         call file%attach_scale('series_'//name, before + 2, 'case')
-      end subroutine attach_quantity
-
-   end subroutine attach_all
 
 end module rodyn_sweep_merge

@@ -9,7 +9,7 @@ module rodyn_sweep_plan
    use rodyn_errors, only: error_type, raise, exit_bad_input
    use rodyn_sorting, only: sorted_order
    use rodyn_sweep_config, only: sweep_axis, sweep_config, axis_size, value_text
-   use rodyn_text, only: to_text
+   use rodyn_text, only: to_text, with_line_ends
    use rodyn_text_buffer, only: text_buffer
    implicit none (type, external)
    private
@@ -153,7 +153,7 @@ contains
    !> (The wall limit is not there: --retry-failed may give cases more time.)
    function plan_text(sweep) result(text)
       type(sweep_config), intent(in) :: sweep
-      character(len=:), allocatable :: text
+      character(len=:), allocatable :: text, lines
       type(text_buffer) :: buffer
       type(case_config) :: base
       integer :: a, i
@@ -182,23 +182,9 @@ contains
       base%output%file = ''
       base%output%ledger = .false.
       base%output%compression = 0
-      call append_lines(buffer, 'base: ', resolved_case(base))
+      lines = resolved_case(base)
+      call buffer%line('base: '//with_line_ends(lines(:len(lines) - 1), nl//'base: '))
       text = buffer%content()
    end function plan_text
-
-   !> Every line of `text`, with a mark in front.
-   subroutine append_lines(buffer, mark, text)
-      type(text_buffer), intent(inout) :: buffer
-      character(len=*), intent(in) :: mark, text
-      integer :: first, length
-
-      first = 1
-      do while (first <= len(text))
-         length = index(text(first:), nl) - 1
-         if (length < 0) length = len(text) - first + 1
-         call buffer%line(mark//text(first:first + length - 1))
-         first = first + length + 1
-      end do
-   end subroutine append_lines
 
 end module rodyn_sweep_plan

@@ -288,7 +288,7 @@ contains
             kept%n_rhs = member%counts%n_rhs
             kept%integration_seconds = member%seconds
             kept%wall_seconds = member%preparation + member%seconds
-            if (member%gave_up .and. member%choice%automatic) then
+            if (member%has_failed .and. member%choice%automatic) then
                call begin_case(self, member%ticket, kept%case, .false., work_type(kept%n_steps, kept%n_rhs, kept%wall_seconds, &
                                                                                   kept%integration_seconds), none)
             else
