@@ -2,7 +2,7 @@
 !>
 !>     tools/bench instructions KIND TIMES
 !>
-!> KIND is rhs, rhs_rigid, rhs_lumped, lanes (eight right-hand sides), or run_dop853, run_gauss, run_adams, run_bdf (0.02 s
+!> KIND is rhs, rhs_rigid, rhs_lumped (rigid rods), rhs_quasistatic (lumped), rhs_condensed, lanes (eight right-hand sides), or run_dop853, run_gauss, run_adams, run_bdf (0.02 s
 !> of the article's table 1), which print the number of their right-hand sides. The instructions of one are the difference
 !> between two TIMES (`instructions/guard.py`).
 program bench_instructions
@@ -52,7 +52,8 @@ contains
       if (allocated(error)) error stop error%message
       config%model%formulation = 'consistent'
       if (kind == 'rhs_rigid' .or. kind == 'rhs_lumped') config%model%bending = 'rigid'
-      if (kind == 'rhs_lumped') config%model%inertia = 'lumped'
+      if (kind == 'rhs_quasistatic' .or. kind == 'rhs_condensed') config%model%bending = 'quasistatic'
+      if (kind == 'rhs_lumped' .or. kind == 'rhs_quasistatic') config%model%inertia = 'lumped'
       config%initial%phi = [0.1_wp, 0.2_wp, -0.1_wp, 0.3_wp]
       call new_scene(scene, config, error)
       if (.not. allocated(error)) call new_motion(motion, scene, .false., error)

@@ -28,7 +28,7 @@ program bench_rhs
    type(case_config) :: config
    integer :: i, round
 
-   allocate (subjects(30))
+   allocate (subjects(31))
    i = 0
    call add('n = 4, consistent, recursive', standard(4))
    config = standard(4)
@@ -64,6 +64,8 @@ program bench_rhs
    call add('n = 4, rigid rods, lumped', config)
    config%model%bending = 'quasistatic'
    call add('n = 4, quasistatic, lumped', config)
+   config%model%inertia = 'distributed'
+   call add('n = 4, condensed', config)
    call add('n = 4, hinge 2 locked', standard(4), locked=[3])
    call add('n = 4, rigid rods, hinge 2 locked', rigid(4), locked=[3])
    call add('n = 1024, every other hinge locked', standard(1024), locked=[(round, round=1, 1024, 2)])

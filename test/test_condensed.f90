@@ -155,7 +155,7 @@ contains
       call check_close(error, difference(:2)/difference(2:), [10.0_wp, 10.0_wp], 0.2_wp, 'ratio of differences')
    end subroutine test_rigid_limit
 
-   !> Work of loads and drives less what dampers and friction take is what the energy gains, and the Jacobian is that of differences.
+   !> Work of loads and drives less what dampers and friction take is what the energy gains; the Jacobian is that of differences.
    subroutine test_hinges(error)
       type(error_type), allocatable, intent(out) :: error
       type(case_config) :: config

@@ -4,8 +4,8 @@
 !> and no others. So with x_k = th_k'' (of a locked hinge x_k = m_k'') as unknowns everything is local: with c = C, d = 1 (locked:
 !> c = 1, d = 0) and m_k'' = c_k x_k, rod k between y = x_{k-1} and z = x_k has
 !>     alpha'' = -(f11 c y + f12 c z),   beta'' = f12 c y + f22 c z,   W' = t + d y - alpha'',   t_out = W' + beta'',
-!> t being the angular acceleration of the end tangent inside hinge k-1 and t_out that of its own outer end; gamma'' adds to t. The
-!> chain beyond node k acts on it by an apparent inertia P (4x4, symmetric) and a bias b,
+!> t being the angular acceleration of the end tangent inside hinge k-1 and t_out that of its own outer end; gamma'' adds to t.
+!> The chain beyond node k acts on it by an apparent inertia P (4x4, symmetric) and a bias b,
 !>     (f, moment, force on x_k) = P (A, t_out, x_k) + b.
 !> From the tip inward rod k is added in (A, t, y, z), and z eliminated: one division a rod. In these unknowns the springs are local,
 !> too: the force on th_k is C (opening - gamma) + t0 + D th' + f, on a locked m_k opening - gamma - th.
