@@ -8,7 +8,7 @@ module test_condensed
    use rodyn_motion, only: motion_type
    use rodyn_scene, only: scene_type, new_scene
    use test_motions, only: check_jacobian, motion_of
-   use test_random_scenes, only: allocate_case, n_all_kinds, random_case, seed_random
+   use test_random_scenes, only: allocate_case, n_all_kinds, random_case, seed_random, uniform
    use test_testing, only: unittest, new_test, check, check_close
    use test_trajectories, only: trajectory, integrate
    implicit none (type, external)
@@ -174,6 +174,7 @@ contains
             call motion%begin_regime(0.0_wp, 1.0_wp, 1.0_wp, y, error)
             if (allocated(error)) return
             call check_jacobian(motion, y, 'with all hinges', error)
+            if (.not. allocated(error)) call check_newton(motion, y, error)
             if (allocated(error)) return
             call integrate(config, [0.0_wp, 0.3_wp, 0.7_wp, 1.0_wp], run, error)
             if (allocated(error)) return
@@ -183,6 +184,31 @@ contains
          end do
       end do
    end subroutine test_hinges
+
+   !> The O(n) solution of a Newton system fits the equations with the Jacobian.
+   subroutine check_newton(motion, y, error)
+      type(motion_type), intent(inout) :: motion
+      real(wp), contiguous, intent(in) :: y(:)
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), parameter :: gamma = 1.0e-2_wp
+      real(wp) :: jac(size(y), size(y))
+      real(wp), dimension(size(y)) :: right, x, residual
+      logical :: ok
+      integer :: i
+
+      right = [(uniform(-1.0_wp, 1.0_wp), i=1, size(y))]
+      x = right
+      call motion%factorise_newton(0.3_wp, y, gamma, .true., ok)
+      call check(error, ok, 'not factored')
+      if (allocated(error)) return
+      call motion%solve_newton(x)
+      call motion%jacobian(0.3_wp, y, jac, ok)
+      residual = right - x + gamma*matmul(jac, x)
+      associate (last => motion%n_controlled)
+         residual = abs(residual)/(abs(right) + abs(x) + gamma*matmul(abs(jac), abs(x)))
+         call check(error, maxval(residual(:last)) < 1.0e-9_wp, 'the solution of a Newton system is off')
+      end associate
+   end subroutine check_newton
 
    !> Driven kinks at the first and the last hinge, which has a spring at an angle and friction; the one before it is held.
    subroutine many_hinges(config, which, n)

@@ -18,7 +18,7 @@ module rodyn_condensed
 
 contains
 
-   !> The scene with slopes as coordinates of their own, without springs: for its inertia only. Hinges and loads stay behind.
+   !> The scene with slopes as coordinates of their own, whose bending matrices have inertia only. Hinges and loads stay behind.
    pure function whole_scene(scene) result(whole)
       type(scene_type), intent(in) :: scene
       type(scene_type) :: whole
@@ -34,8 +34,7 @@ contains
       whole%rods = scene%rods
       whole%bending = scene%bending
       whole%rod_of = scene%rod_of
-      do j = 1, size(whole%rods)
-         whole%rods(j)%stiffness = 0.0_wp
+      do j = 1, size(whole%bending)
          whole%bending(j)%stiffness = 0.0_wp
       end do
    end function whole_scene

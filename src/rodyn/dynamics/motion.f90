@@ -549,10 +549,12 @@ contains
       end associate
    end subroutine factorise_newton
 
-   !> The O(n) factorisation knows neither locked hinges nor a third bending shape.
+   !> The O(n) factorisation knows neither locked hinges, unless rods are condensed, nor a third bending shape.
    pure logical function is_dense(self)
       class(motion_type), intent(in) :: self
-      is_dense = self%dynamics%hinges%has_locks .or. self%dynamics%scene%n_bend == 3 .or. self%dynamics%scene%condensed
+      associate (scene => self%dynamics%scene)
+         is_dense = (self%dynamics%hinges%has_locks .and. .not. scene%condensed) .or. scene%n_bend == 3
+      end associate
    end function is_dense
 
    !> x <- (1 - gamma J)^-1 x.

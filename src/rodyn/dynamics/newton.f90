@@ -15,6 +15,8 @@ module rodyn_newton
    use rodyn_newton_tangent, only: rod_tangent, linearise_rods
    use rodyn_newton_root, only: newton_root
    use rodyn_newton_chain, only: rod_factor, factorise_chain, reduce_chain, expand_chain
+   use rodyn_newton_condensed, only: condensed_newton, new_condensed_newton, linearise_condensed, factorise_condensed, &
+      reduce_condensed, expand_condensed
    use rodyn_newton_series, only: series_factor, factorise_series, reduce_series, expand_series, of_opening
    implicit none (type, external)
    private
@@ -28,6 +30,7 @@ module rodyn_newton
       type(rod_tangent), allocatable :: tangent(:)   !! (n)
       type(rod_factor), allocatable :: factor(:)     !! (n), or
       type(series_factor), allocatable :: damped(:)  !! (n)
+      type(condensed_newton), allocatable :: condensed !! for condensed rods
       type(newton_root) :: root
       real(wp) :: place(2) = 0.0_wp           !! u_x, u_y [m]
       real(wp), allocatable :: hinge(:)       !! c = g^2 C + g D, or C (+ D/g if relaxing) of massless rods that bend (0:n-1)
@@ -57,7 +60,11 @@ contains
       real(wp), intent(in) :: node_force(:, :)     !! X, Y at the nodes (2, n) [N]
 
       if (.not. allocated(self%tangent)) call allocate_newton(self, scene, hinges)
-      call linearise_rods(scene, sine, cosine, q, p, a, loaded, node_force, self%tangent)
+      if (scene%condensed) then
+         call linearise_condensed(self%condensed, scene, hinges, sine, cosine, q, p, a, loaded, node_force, self%tangent)
+      else
+         call linearise_rods(scene, sine, cosine, q, p, a, loaded, node_force, self%tangent)
+      end if
       if (scene%n_base == 0) return
       self%root%velocity = p(1:2)
       self%root%omega = p(3)
@@ -69,13 +76,16 @@ contains
       type(scene_type), intent(in) :: scene
       type(hinge_law), intent(in) :: hinges
 
-      self%series = scene%quasistatic
+      self%series = scene%lumped .and. scene%quasistatic
       associate (n => scene%n)
          allocate (self%tangent(n), self%hinge(0:n - 1), self%moment(0:n), self%opening(0:n - 1))
          allocate (self%damping(0:n - 1), source=hinges%damping)
          if (size(hinges%relaxing) > 0) self%damping = 0.0_wp
          allocate (self%angle(scene%n_q), self%rate(scene%n_dof))
-         if (self%series) then
+         if (scene%condensed) then
+            allocate (self%condensed, self%left(1, n))
+            call new_condensed_newton(self%condensed, scene, hinges)
+         else if (self%series) then
             allocate (self%damped(n), self%left(5, n))
          else
             allocate (self%factor(n), self%left(3, n))
@@ -94,7 +104,9 @@ contains
 
       self%gamma = gamma
       associate (law => hinges)
-         if (self%series) then
+         if (scene%condensed) then
+            call factorise_condensed(self%condensed, scene, law, gamma, self%tangent, apparent, by_omega, ok)
+         else if (self%series) then
             self%hinge = law%stiffness
             if (size(law%relaxing) > 0) then
                self%hinge = law%stiffness + law%damping/gamma
@@ -132,7 +144,7 @@ contains
          z = 0.0_wp
          acceleration = 0.0_wp
          call known_moments(self, scene, hinges)
-         call inward(self, scene, root_rate(3), known)
+         call inward(self, scene, hinges, root_rate(3), known)
          if (scene%n_base > 0) then
             known(3) = known(3) - self%moment(0)
             call self%root%solve(scene%body, root_rate, known, z, acceleration)
@@ -151,6 +163,10 @@ contains
       type(hinge_law), intent(in) :: hinges
       integer :: i, k
 
+      if (scene%condensed) then ! of its hinges `rodyn_newton_condensed` knows
+         self%moment = 0.0_wp
+         return
+      end if
       associate (law => hinges, n => scene%n, f => scene%phi_at() + 1, pull => self%moment)
          if (size(law%relaxing) == 0) then
             call hinge_tangent(law, n, scene%dynamic_bending, self%angle(f:), self%rate(f:), self%opening, self%moment)
@@ -173,14 +189,17 @@ contains
       end associate
    end subroutine known_moments
 
-   subroutine inward(self, scene, d_omega, known)
+   subroutine inward(self, scene, hinges, d_omega, known)
       class(newton_type), intent(inout) :: self
       type(scene_type), intent(in) :: scene
+      type(hinge_law), intent(in) :: hinges
       real(wp), intent(in) :: d_omega
       real(wp), intent(out) :: known(3)
 
       associate (f => scene%phi_at() + 1, dq => self%angle, dp => self%rate)
-         if (self%series) then
+         if (scene%condensed) then
+            call reduce_condensed(self%condensed, scene, hinges, self%tangent, dq, dp, known)
+         else if (self%series) then
             call reduce_series(scene%n, scene%rods, scene%rod_of, self%tangent, self%damped, d_omega, dq(f:), dp(f:), &
                                self%moment, self%left, known)
          else if (scene%dynamic_bending) then
@@ -201,7 +220,9 @@ contains
       real(wp), intent(in) :: d_omega, omega_rate, acceleration(2)
 
       associate (f => scene%phi_at() + 1, dq => self%angle, dp => self%rate, a => acceleration)
-         if (self%series) then
+         if (scene%condensed) then
+            call expand_condensed(self%condensed, scene, self%tangent, dq, dp, omega_rate, a, self%left(1, :))
+         else if (self%series) then
             call expand_series(scene%n, scene%rods, scene%rod_of, self%tangent, self%damped, d_omega, dq(f:), dp(f:), &
                                omega_rate, a(1), a(2), self%left)
          else

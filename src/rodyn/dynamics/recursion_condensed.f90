@@ -7,7 +7,7 @@
 !> t being the angular acceleration of the end tangent inside hinge k-1 and t_out that of its own outer end; gamma'' adds to t.
 !> The chain beyond node k acts on it by an apparent inertia P (4x4, symmetric) and a bias b,
 !>     (f, moment, force on x_k) = P (A, t_out, x_k) + b.
-!> From the tip inward rod k is added in (A, t, y, z), and z eliminated: one division a rod. In these unknowns the springs are local,
+!> From the tip inward rod k is added in (A, t, y, z), and z eliminated: one division a rod. In these unknowns springs are local,
 !> too: the force on th_k is C (opening - gamma) + t0 + D th' + f, on a locked m_k opening - gamma - th.
 !> The same equations elsewhere: docs/model.md sec. 7.
 module rodyn_recursion_condensed
@@ -18,7 +18,7 @@ module rodyn_recursion_condensed
    use rodyn_spacecraft, only: spacecraft_body
    implicit none (type, external)
    private
-   public :: condensed_recursion, new_condensed_recursion, condensed_accelerations
+   public :: condensed_recursion, new_condensed_recursion, condensed_accelerations, condensed_rod, prepare_rod
 
    !> Constants of rod k between its hinges.
    type :: condensed_rod

@@ -43,12 +43,20 @@ contains
       if (len(text) > 0) text = text//new_line('a')
       if (term > huge(term)) then
          text = text//'quasistatic bending neglects terms (D w/C)^2 of the dampers: without bound at hinge '// &
-                to_text(hinge)//', which has a damper but no spring'//remedy
+                to_text(hinge)//', which has a damper but no spring'//remedy_of(scene)
          return
       end if
       text = text//'quasistatic bending neglects terms (D w/C)^2 of the dampers: up to '//formatted(term, '(es8.1)')// &
-             ' (hinge '//to_text(hinge)//', w = '//formatted(frequency, '(es8.2)')//' rad/s)'//remedy
+             ' (hinge '//to_text(hinge)//', w = '//formatted(frequency, '(es8.2)')//' rad/s)'//remedy_of(scene)
    end function notes_on
+
+   !> What keeps these terms; condensed rods have nothing that does.
+   pure function remedy_of(scene) result(text)
+      type(scene_type), intent(in) :: scene
+      character(len=:), allocatable :: text
+      text = remedy
+      if (scene%condensed) text = ''
+   end function remedy_of
 
    !> Largest (D w/C)^2 of the hinges, w the highest natural frequency, docs/model.md sec. 5: the relative size of what
    !> quasistatic bending with reduced dampers leaves out. Zero where nothing is left out or nobody looks.
