@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Plot distributed against lumped inertia over an axis of a sweep, and their difference (the article's figure 5, table 3).
+"""Plot distributed against lumped inertia, and condensed rods where there are any, over an axis of a sweep (the article's figure 5, table 3).
 
     postproc/exact_lumped.py results/table3 --axis mass_ratio
 """
@@ -20,20 +20,32 @@ from rodyn_data import DataError, Quantity, Sweep, open_sweep, text_of
 from sweep_lines import Places, default_axis, default_quantities, heading, mark_failed
 
 INERTIA = "model.inertia"
-KINDS = ("distributed", "lumped")
+BENDING = "model.bending"
+LINES = {"exact": 0, "condensed": 1, "lumped": 2}  # their styles
 
 
-class Pair(NamedTuple):
-    """Both kinds of inertia at the same values of an axis; NaN where one of them has no result."""
+class Compared(NamedTuple):
+    """All kinds of rods at the same values of an axis; NaN where one of them has no result."""
 
     x: np.ndarray  # the axis, rising
-    exact: Quantity
-    lumped: Quantity
+    lines: dict[str, Quantity]  # exact, condensed, lumped
     failed: list[float]  # axis values of cases without result
 
-    @property
-    def difference(self) -> np.ndarray:
-        return self.exact.values - self.lumped.values
+    def difference(self, kind: str) -> np.ndarray:
+        return self.lines["exact"].values - self.lines[kind].values
+
+
+def kinds(sweep: Sweep) -> dict[str, dict[str, str]]:
+    """The kinds of rods that a sweep has, and by which values on its axes their cases are found."""
+    inertia = sweep.axis(INERTIA)
+    found = {"exact": {INERTIA: "distributed"}, "lumped": {INERTIA: "lumped"}}
+    for place in found.values():
+        if place[INERTIA] not in inertia:
+            raise DataError(f"{sweep.path}: no case with {INERTIA} = '{place[INERTIA]}'")
+    if BENDING in sweep.axes and {"dynamic", "quasistatic"} <= set(sweep.axis(BENDING)[inertia == "distributed"]):
+        both = ("exact", "dynamic"), ("condensed", "quasistatic")
+        return {kind: {INERTIA: "distributed", BENDING: bending} for kind, bending in both} | {"lumped": found["lumped"]}
+    return found
 
 
 def plot(file: str | pathlib.Path, out: str | pathlib.Path, quantities: Sequence[str] = (), axis: str | None = None,
@@ -49,15 +61,12 @@ def table_3_quantities(sweep: Sweep) -> list[str]:
     return [*sweep.states(), "displacement_x", "rotation"] if sweep.n_rods else default_quantities(sweep)
 
 
-def pair_up(sweep: Sweep, name: str, axis: str | None, where: Mapping[str, Any], time: float | None) -> tuple[str, Pair]:
-    """The axis, and the pair of lines."""
-    kinds = sweep.axis(INERTIA)
+def compare(sweep: Sweep, name: str, axis: str | None, where: Mapping[str, Any], time: float | None) -> tuple[str, Compared]:
+    """The axis, and the lines."""
     axis = axis or default_axis(sweep)
     lines = {}
-    for kind in KINDS:
-        if kind not in kinds:
-            raise DataError(f"{sweep.path}: no case with {INERTIA} = '{kind}'")
-        found = sweep.series(name, [axis], dict(where) | {INERTIA: kind}, time)
+    for kind, place in kinds(sweep).items():
+        found = sweep.series(name, [axis], dict(where) | place, time)
         # Whatever changes together with the inertia ('bending', say) does not split its cases.
         if len(found) > 1:
             raise DataError(f"{sweep.path}: fix {', '.join(found[0].where)} by --where")
@@ -72,7 +81,7 @@ def pair_up(sweep: Sweep, name: str, axis: str | None, where: Mapping[str, Any],
             if sweep.failed[case]:
                 failed.append(text_of(values[case]))
         aligned[kind] = line.quantity._replace(values=column)
-    return axis, Pair(np.array(x), aligned["distributed"], aligned["lumped"], failed)
+    return axis, Compared(np.array(x), aligned, failed)
 
 
 def draw(sweep: Sweep, names: Sequence[str], axis: str | None, where: Mapping[str, Any], time: float | None) -> Figure:
@@ -82,18 +91,18 @@ def draw(sweep: Sweep, names: Sequence[str], axis: str | None, where: Mapping[st
     figure.suptitle(f"Exact and lumped inertia: {heading(sweep, names, time, where, 24 * columns)}")
     total = int(sweep.chosen(where).sum())
     for i, name in enumerate(names):
-        axis, pair = pair_up(sweep, name, axis, where, time)
+        axis, compared = compare(sweep, name, axis, where, time)
         top, bottom = grid[2 * (i // columns):, i % columns][:2]
         places = Places(top, sweep, axis)
         Places(bottom, sweep, axis)
-        x = places.of(pair.x)
-        top.plot(x, pair.exact.values, label="exact", **style.mark_style(0, x.size))
-        top.plot(x, pair.lumped.values, label="lumped", **style.mark_style(2, x.size))
-        failed = places.of(np.array(pair.failed)) if pair.failed else []
+        x = places.of(compared.x)
+        for kind, line in compared.lines.items():
+            top.plot(x, line.values, label=kind, **style.mark_style(LINES[kind], x.size))
+        failed = places.of(np.array(compared.failed)) if compared.failed else []
         mark_failed(top, failed, total)
-        top.set(ylabel=pair.exact.label)
-        top.set_title(pair.exact.meaning, loc="left")
-        draw_difference(bottom, x, pair, failed)
+        top.set(ylabel=compared.lines["exact"].label)
+        top.set_title(compared.lines["exact"].meaning, loc="left")
+        draw_differences(bottom, x, compared, failed)
         bottom.set(xlabel=sweep.axis_label(axis))
     for axes in grid[:, -1][2 * (len(names) // columns):]:
         axes.set_visible(False)
@@ -101,17 +110,22 @@ def draw(sweep: Sweep, names: Sequence[str], axis: str | None, where: Mapping[st
     return figure
 
 
-def draw_difference(axes: Axes, x: np.ndarray, pair: Pair, failed: Sequence[float]) -> None:
-    """Its size, on a log axis."""
-    size = np.abs(pair.difference)
-    size[size == 0] = np.nan
-    axes.set_ylabel("|exact − lumped|" + (f" [{pair.exact.unit}]" if pair.exact.unit else ""))
-    if np.all(np.isnan(size)):
+def draw_differences(axes: Axes, x: np.ndarray, compared: Compared, failed: Sequence[float]) -> None:
+    """Their sizes, on a log axis."""
+    others = [kind for kind in compared.lines if kind != "exact"]
+    unit = compared.lines["exact"].unit
+    axes.set_ylabel(f"|exact − {others[0]}|" if len(others) == 1 else "difference from exact")
+    if unit:
+        axes.set_ylabel(f"{axes.get_ylabel()} [{unit}]")
+    sizes = {kind: np.where(compared.difference(kind) == 0, np.nan, np.abs(compared.difference(kind))) for kind in others}
+    if np.isnan(list(sizes.values())).all():
         style.note(axes, "no difference")
         return
-    axes.semilogy(x, size, **style.mark_style(1, x.size))
-    mark_failed(axes, failed, 0)
-    axes.lines[-1].set_label("_nolegend_" if len(failed) else "|exact − lumped|")
+    for kind, size in sizes.items():
+        axes.semilogy(x, size, label=f"|exact − {kind}|", **style.mark_style(LINES[kind] + 3, x.size))
+    if len(failed):
+        mark_failed(axes, failed, 0)
+        axes.lines[-1].set_label("_nolegend_")  # it is in the legend already
     style.log_labels(axes.yaxis)
 
 

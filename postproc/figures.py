@@ -83,7 +83,7 @@ def of_sweep(file: str | pathlib.Path, sweep: Sweep) -> Iterator[Picture]:
     numbers = [name for name, values in changing.items() if values.dtype.kind in "fiu"]
     if not changing or not sweep.done.any():
         return
-    paired = exact_lumped.INERTIA in changing and set(exact_lumped.KINDS) <= set(changing[exact_lumped.INERTIA])
+    paired = exact_lumped.INERTIA in changing and {"distributed", "lumped"} <= set(changing[exact_lumped.INERTIA])
     few = sweep_lines.count(sweep, sweep_lines.default_axis(sweep)) <= sweep_lines.MOST_LINES
     if few and sweep.states():
         yield Picture("lines", "Angles of the first and the last rod.", lambda out: sweep_lines.plot(file, out))

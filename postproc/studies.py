@@ -8,10 +8,13 @@ import argparse
 import sys
 
 import numpy as np
+import style
 from article import TABLE_3, TABLE_3_AXIS, TABLE_3_QUANTITIES, TABLE_3_TIME, printed, range_text, slipped_displacement
+from exact_lumped import kinds
 from rodyn_data import DataError, Sweep, distinct, open_sweep
 
 N_RODS = 4
+PRINTED = ("exact", "lumped")
 
 
 def print_times(sweep: Sweep, times: list[int]) -> None:
@@ -31,14 +34,13 @@ def print_times(sweep: Sweep, times: list[int]) -> None:
                   f"{phi[i]:17.12f}{phi[i] - true_phi:10.1e} {rate[i]:15.10f}{rate[i] - true_rate:10.1e}{int(n_rhs[i]):10d}")
 
 
-def pairs(sweep: Sweep) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Mass ratios, and the numbers of the exact and of the lumped cases, in the same order."""
-    exact = np.flatnonzero(sweep.chosen({"model.inertia": "distributed"}))
-    lumped = np.flatnonzero(sweep.chosen({"model.inertia": "lumped"}))
+def cases_by_kind(sweep: Sweep) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Mass ratios, and the numbers of the exact, the lumped and, where there are any, the condensed cases, in the same order."""
+    cases = {kind: np.flatnonzero(sweep.chosen(place)) for kind, place in kinds(sweep).items()}
     ratios = sweep.axis(TABLE_3_AXIS)
-    if not np.array_equal(ratios[exact], ratios[lumped]):
-        raise DataError(f"{sweep.path}: the exact and the lumped cases have other mass ratios")
-    return ratios[exact], exact, lumped
+    if not all(np.array_equal(ratios[cases["exact"]], ratios[found]) for found in cases.values()):
+        raise DataError(f"{sweep.path}: the exact and the other cases have other mass ratios")
+    return ratios[cases["exact"]], cases
 
 
 def per_rod(sweep: Sweep, name: str, t: float) -> np.ndarray:
@@ -48,56 +50,52 @@ def per_rod(sweep: Sweep, name: str, t: float) -> np.ndarray:
 
 def table_3(sweep: Sweep) -> None:
     """phi_1, phi_4, u_x as the article has it and theta at t = 1 s, ours beside the printed numbers; the true u_x."""
-    ratios, exact, lumped = pairs(sweep)
+    ratios, cases = cases_by_kind(sweep)
     columns = {name: sweep.quantity(name, TABLE_3_TIME).values for name, _ in TABLE_3_QUANTITIES}
     true = columns["displacement_x"]
     columns["displacement_x"] = slipped_displacement(sweep)
     scales = {"deg": 180.0 / np.pi}
     heads = ["phi_1, deg", "phi_4, deg", "u of u' = Vx - w u", "theta, rad"]
-    print(" ratio       " + "".join(f"{head:>20}" for head in heads) + "     u_x, m   (ours and the article's; ours)")
-    equal = dict.fromkeys(("exact", "lumped"), 0)
+    print(" ratio          " + "".join(f"{head:>20}" for head in heads) + "     u_x, m   (ours and the article's; ours)")
+    equal = dict.fromkeys(PRINTED, 0)
     for row, ratio in enumerate(ratios):
-        for kind, (word, cases) in enumerate((("exact", exact), ("lumped", lumped))):
-            ours = [f"{columns[name][cases[row]] * scales.get(unit, 1.0):.3f}" for name, unit in TABLE_3_QUANTITIES]
-            theirs = TABLE_3[int(ratio)][kind]
-            equal[word] += sum(a == b for a, b in zip(ours, theirs, strict=True))
-            print(f"{ratio:6g} {word:6}" + "".join(f"{a:>11}{b:>9}" for a, b in zip(ours, theirs, strict=True))
-                  + f"{true[cases[row]]:11.5f}")
-    print(", ".join(f"{word}: {number} of {4 * len(ratios)} numbers are the printed ones" for word, number in equal.items()))
+        for kind, found in cases.items():
+            ours = [f"{columns[name][found[row]] * scales.get(unit, 1.0):.3f}" for name, unit in TABLE_3_QUANTITIES]
+            theirs = TABLE_3[int(ratio)][PRINTED.index(kind)] if kind in PRINTED else [""] * len(ours)
+            if kind in PRINTED:
+                equal[kind] += sum(a == b for a, b in zip(ours, theirs, strict=True))
+            print(f"{ratio:6g} {kind:9}" + "".join(f"{a:>11}{b:>9}" for a, b in zip(ours, theirs, strict=True))
+                  + f"{true[found[row]]:11.5f}")
+    print(", ".join(f"{kind}: {number} of {4 * len(ratios)} numbers are the printed ones" for kind, number in equal.items()))
 
 
-def differences(sweep: Sweep) -> tuple[np.ndarray, np.ndarray]:
-    """Mass ratios, and the largest |exact - lumped| of the four chord angles at each probe time, rad."""
-    ratios, exact, lumped = pairs(sweep)
-    angles = [per_rod(sweep, "phi", t) for t in sweep.probe_times]
-    return ratios, np.stack([np.abs(phi[exact] - phi[lumped]).max(axis=1) for phi in angles], axis=1)
+def differences(sweep: Sweep) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Mass ratios, and of each other kind the largest |phi exact - phi| of the four rods at each probe time, rad."""
+    ratios, cases = cases_by_kind(sweep)
+    angles = np.stack([per_rod(sweep, "phi", t) for t in sweep.probe_times], axis=1)
+    exact = angles[cases["exact"]]
+    return ratios, {kind: np.abs(exact - angles[found]).max(axis=2) for kind, found in cases.items() if kind != "exact"}
 
 
 def figure_5(sweep: Sweep, plot: str | None) -> None:
-    """How exact - lumped shrinks."""
+    """How the differences from exact shrink."""
     ratios, largest = differences(sweep)
     times = sweep.probe_times
-    print("largest |phi exact - phi lumped| of the four rods, rad")
-    print("    ratio" + "".join(f"   t = {t:g} s".rjust(13) for t in times) + "   mean of the times")
-    for ratio, row in zip(ratios, largest, strict=True):
-        print(f"{ratio:9.3f}" + "".join(f"{value:13.5f}" for value in row) + f"{row.mean():13.5f}")
-    high = ratios >= 8
-    slope = np.polyfit(np.log(ratios[high]), np.log(largest[high].mean(axis=1)), 1)[0]
-    print(f"from ratio 8 on the mean falls like ratio^{slope:.2f}")
+    for kind, found in largest.items():
+        print(f"largest |phi exact - phi {kind}| of the four rods, rad")
+        print("    ratio" + "".join(f"   t = {t:g} s".rjust(13) for t in times) + "   mean of the times")
+        for ratio, row in zip(ratios, found, strict=True):
+            print(f"{ratio:9.3f}" + "".join(f"{value:13.3g}" for value in row) + f"{row.mean():13.3g}")
+        high = ratios >= 8
+        slope = np.polyfit(np.log(ratios[high]), np.log(found[high].mean(axis=1)), 1)[0]
+        print(f"from ratio 8 on the mean falls like ratio^{slope:.2f}")
     if plot:
-        import matplotlib
-
-        matplotlib.use("Agg")
-        from matplotlib import pyplot
-
-        figure, axes = pyplot.subplots(figsize=(7, 4.5))
-        for k, t in enumerate(times):
-            axes.loglog(ratios, largest[:, k], marker=".", label=f"t = {t:g} s")
-        axes.set(xlabel="total node mass / total rod mass", ylabel="largest |phi exact - phi lumped|, rad")
-        axes.grid(visible=True, which="both", alpha=0.3)
-        axes.legend()
-        figure.tight_layout()
-        figure.savefig(plot, dpi=120)
+        figure, ((axes,),) = style.new_figure(width=0.7 * style.WIDTH, height=3.6)
+        for i, (kind, found) in enumerate(largest.items()):
+            axes.loglog(ratios, found.mean(axis=1), label=f"exact − {kind}, mean of {len(times)} times", **style.mark_style(i, ratios.size))
+        axes.set(xlabel="total node mass / total rod mass", ylabel=r"largest $|\Delta\varphi|$ of the rods [rad]")
+        style.legend_below(figure, [axes])
+        style.save(figure, plot)
 
 
 def main() -> int:

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import command
 import numpy as np
 from article import TABLE_1, TABLE_2, TABLE_3, TABLE_3_AXIS, TABLE_3_QUANTITIES, TABLE_3_TIME, Printed, slipped_displacement
-from exact_lumped import INERTIA, KINDS
+from exact_lumped import kinds
 from rodyn_data import DataError, Run, Sweep, is_sweep, open_run, open_sweep, split_name, symbol_text
 
 MISSING = "–"
@@ -125,14 +125,15 @@ def table_3(sweep: Sweep) -> Table:
     head += [f"{q.symbol}, {'°' if unit == 'deg' else unit}" for q, (_, unit) in zip(quantities, TABLE_3_QUANTITIES, strict=True)]
     head.append(r"$u$ of $\dot{u} = V_x - \omega u$, m")
     columns = [q.values * factor for q, factor in zip(quantities, factors, strict=True)] + [slipped_displacement(sweep)]
-    ratios, inertia = sweep.axis(TABLE_3_AXIS).astype(float), sweep.axis(INERTIA)
+    ratios = sweep.axis(TABLE_3_AXIS).astype(float)
+    chosen = {kind: sweep.chosen(place) for kind, place in kinds(sweep).items()}
     rows = []
     for ratio in sorted({*ratios, *map(float, TABLE_3)}):
-        cases = [np.flatnonzero(np.isclose(ratios, ratio) & (inertia == kind)) for kind in KINDS]
-        if all(found.size for found in cases):
-            rows += block(f"{ratio:g}", "Rodyn", *([column[found[0]] for column in columns] for found in cases))
+        cases = {kind: np.flatnonzero(np.isclose(ratios, ratio) & some) for kind, some in chosen.items()}
+        if all(found.size for found in cases.values()):
+            rows += block(f"{ratio:g}", "Rodyn", {kind: [column[found[0]] for column in columns] for kind, found in cases.items()})
         if ratio in TABLE_3:
-            rows += block(f"{ratio:g}", "article", *(under_its_equation(line) for line in TABLE_3[int(ratio)]))
+            rows += block(f"{ratio:g}", "article", dict(zip(("exact", "lumped"), map(under_its_equation, TABLE_3[int(ratio)]), strict=True)))
     return Table(f"Table 3. Exact and lumped inertia at t = {TABLE_3_TIME:g} s", head, rows, TABLE_3_NOTE)
 
 
@@ -142,10 +143,10 @@ def under_its_equation(line: Sequence[str]) -> list[float]:
     return [*angles, np.nan, rotation, displacement]
 
 
-def block(ratio: str, source: str, exact: Sequence[float], lumped: Sequence[float]) -> list[list[str]]:
-    lines = [("exact", exact), ("lumped", lumped), ("difference", [a - b for a, b in zip(exact, lumped, strict=True)])]
+def block(ratio: str, source: str, lines: dict[str, list[float]]) -> list[list[str]]:
+    difference = [a - b for a, b in zip(lines["exact"], lines["lumped"], strict=True)]
     return [[ratio, source, name, *(fixed(v, 3, MISSING if np.isfinite(values).any() else "failed") for v in values)]
-            for name, values in lines]
+            for name, values in (*lines.items(), ("exact − lumped", difference))]
 
 
 def fixed(value: float, digits: int, missing: str = "failed") -> str:
