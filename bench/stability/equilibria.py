@@ -9,6 +9,7 @@ a latch lies between its start and every minimum that is found from there.
 
 from __future__ import annotations
 
+import argparse
 import pathlib
 import subprocess
 import sys
@@ -146,8 +147,11 @@ def fault_of(scene: Scene, directory: pathlib.Path) -> str:
 
 
 def main() -> int:
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
-    seed = int(sys.argv[2]) if len(sys.argv) > 2 else 1
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenes", nargs="?", type=int, default=1000)
+    parser.add_argument("seed", nargs="?", type=int, default=1)
+    options = parser.parse_args()
+    count, seed = options.scenes, options.seed
     faults = 0
     with tempfile.TemporaryDirectory() as directory:
         for i in range(seed, seed + count):

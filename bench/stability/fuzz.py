@@ -37,6 +37,7 @@ import numpy as np
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 import program
 from mutants import mutant, pieces
+from support import ROOT
 
 STOP_AFTER = 0.5  # [s]
 MOST_REDUCTIONS = 400
@@ -272,7 +273,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=20170707)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--only", type=int, help="this one, with all that is said")
-    parser.add_argument("--keep", type=pathlib.Path, default=program.ROOT / "build" / "fuzz", help="where what breaks is kept")
+    parser.add_argument("--keep", type=pathlib.Path, default=ROOT / "build" / "fuzz", help="where what breaks is kept")
     options = parser.parse_args()
     if options.only is not None:
         outcome = one((options.seed, options.only))

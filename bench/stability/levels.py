@@ -9,6 +9,7 @@ With exact dampers the slopes are states that decay within microseconds, and the
 
 from __future__ import annotations
 
+import argparse
 import pathlib
 import subprocess
 import sys
@@ -39,4 +40,6 @@ def main(programs: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:3]))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("programs", nargs=2, metavar="PROGRAM")
+    sys.exit(main(parser.parse_args().programs))

@@ -8,6 +8,7 @@ none of these three is compiled, which is the physics with its own integrators, 
 
 from __future__ import annotations
 
+import argparse
 import pathlib
 import re
 import subprocess
@@ -94,4 +95,6 @@ def main(compiler: str) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1] if len(sys.argv) > 1 else "flang-new-19"))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("compiler", nargs="?", default="flang-new-19")
+    sys.exit(main(parser.parse_args().compiler))

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import argparse
 import pathlib
 import re
 import subprocess
@@ -64,4 +65,6 @@ def main(program: str) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1]))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("program")
+    sys.exit(main(parser.parse_args().program))

@@ -6,6 +6,7 @@ Prints one line per finding; exits with 1 if one of them is not what docs/sweeps
 than bin/rodyn. Everything is written into one new directory (in TMPDIR), which alone is removed at the end.
 """
 
+import argparse
 import contextlib
 import os
 import pathlib
@@ -372,10 +373,11 @@ TRIALS = ("same", "signals", "kills", "rank_kills", "truncation", "bits", "open_
 
 
 def main() -> int:
-    names = sys.argv[1:] or TRIALS
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("trials", nargs="*", metavar="TRIAL", help=", ".join(TRIALS))
+    names = parser.parse_args().trials or TRIALS
     if unknown := set(names) - set(TRIALS):
-        print(f"unknown: {', '.join(sorted(unknown))}; there are {', '.join(TRIALS)}", file=sys.stderr)
-        return 2
+        parser.error(f"unknown: {', '.join(sorted(unknown))}; there are {', '.join(TRIALS)}")
     with tempfile.TemporaryDirectory(prefix="rodyn-sweeps-") as root:
         campaign = Campaign(Scratch(root))
         for name in names:
