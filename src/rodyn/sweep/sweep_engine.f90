@@ -16,7 +16,6 @@ module rodyn_sweep_engine
    use rodyn_sweep_directory, only: sweep_directory, result_name
    use rodyn_sweep_forecast, only: print_forecast
    use rodyn_sweep_index, only: sweep_index
-   use rodyn_sweep_notices, only: notice_list
    use rodyn_sweep_plan, only: sweep_plan, new_plan, plan_text
    use rodyn_sweep_progress, only: sweep_counts, sweep_progress
    use rodyn_sweep_ranks, only: rank_group, at_done, at_errors, at_failed, at_next, at_stopped
@@ -25,14 +24,15 @@ module rodyn_sweep_engine
    use rodyn_sweep_worker, only: case_feed, lanes_text, run_cases, uses_lanes
    use rodyn_sweep_writer, only: shard_writer
    use rodyn_terminal, only: print_error_line, print_line
-   use rodyn_text, only: as_utf8, formatted, to_text
+   use rodyn_text, only: as_utf8, formatted, to_text, with_line_ends
    implicit none (type, external)
    private
    public :: run_sweep, sweep_options
 
    !> The command line
    type :: sweep_options
-      character(len=:), allocatable :: file, output
+      character(len=:), allocatable :: file   !! the one positional argument
+      character(len=:), allocatable :: output !! --output
       integer :: shard = 0, n_shards = 0 !! --shard I/N; 0, 0: all cases
       logical :: dry_run = .false., retry_failed = .false., force = .false., quiet = .false.
    end type sweep_options
@@ -215,7 +215,6 @@ contains
       type(engine_type), intent(inout) :: engine
       type(error_type), allocatable, intent(out) :: error
       type(sweep_index) :: index
-      type(notice_list) :: notices
       character(len=:), allocatable :: path
       character(len=16) :: number
       integer(i8) :: ignored, number_of_shard
@@ -228,9 +227,9 @@ contains
          call engine%directory%open(path, plan_text(engine%sweep), engine%options%shard, engine%options%n_shards, &
                                     engine%options%force, error)
          if (.not. allocated(error)) call index%scan(engine%directory, engine%shape, engine%plan%n_cases, engine%tag, &
-                                                     other_shards(engine%options), .false., notices, error)
+                                                     other_shards(engine%options), .false., error)
          if (.not. allocated(error)) call list_todo(engine, index)
-         call tell_start(engine, notices, error)
+         call print_start(engine, index, error)
       end if
       call share_fault(engine, error)
       if (allocated(error)) return
@@ -310,16 +309,13 @@ contains
    end subroutine list_todo
 
    !> First lines, and what was found in the directory.
-   subroutine tell_start(engine, notices, error)
+   subroutine print_start(engine, index, error)
       type(engine_type), intent(inout) :: engine
-      type(notice_list), intent(in) :: notices
+      type(sweep_index), intent(in) :: index
       type(error_type), allocatable, intent(in) :: error
       character(len=:), allocatable :: line
-      integer :: i
 
-      do i = 1, notices%n
-         call print_error_line(as_utf8(engine%options%output//': '//trim(notices%text(i))))
-      end do
+      call print_notices(engine%options%output, index)
       if (allocated(error)) return
       call engine%progress%start(status_name(engine), engine%options%quiet)
       if (engine%options%quiet) return
@@ -335,7 +331,14 @@ contains
       end if
       call print_line('sweep   '//line)
       call print_line('lanes   '//lanes_text(engine%sweep, engine%plan))
-   end subroutine tell_start
+   end subroutine print_start
+
+   subroutine print_notices(path, index)
+      character(len=*), intent(in) :: path
+      type(sweep_index), intent(in) :: index
+      if (.not. allocated(index%notices)) return
+      if (len(index%notices) > 0) call print_error_line(as_utf8(path//': '//with_line_ends(index%notices, nl//path//': ')))
+   end subroutine print_notices
 
    function status_name(engine) result(path)
       type(engine_type), intent(in) :: engine
@@ -501,19 +504,15 @@ contains
       integer, intent(out) :: exit_code
       type(error_type), allocatable, intent(out) :: error
       type(sweep_index) :: index
-      type(notice_list) :: notices
       type(sweep_counts) :: counts
       character(len=:), allocatable :: aside, path
       integer :: i, n_missing
 
       exit_code = exit_failed
       path = engine%directory%path//'/'//result_name
-      call index%scan(engine%directory, engine%shape, engine%plan%n_cases, engine%tag, other_shards(engine%options), .true., &
-                      notices, error)
+      call index%scan(engine%directory, engine%shape, engine%plan%n_cases, engine%tag, other_shards(engine%options), .true., error)
       if (allocated(error)) return
-      do i = 1, notices%n
-         call print_error_line(engine%directory%path//': '//trim(notices%text(i)))
-      end do
+      call print_notices(engine%directory%path, index)
       n_missing = 0
       do i = 1, engine%plan%n_cases
          select case (index%status(engine%plan%same_as(i)))
@@ -542,12 +541,12 @@ contains
       exit_code = merge(exit_failed, exit_done, counts%failed > 0)
       call engine%progress%finish('done', counts)
       if (engine%options%quiet) return
-      call tell_end(engine, index, counts, error)
+      call print_end(engine, index, counts, error)
       call index%close()
    end subroutine verify_and_merge
 
    !> Last lines: counts, costs, and the first cases that failed.
-   subroutine tell_end(engine, index, counts, error)
+   subroutine print_end(engine, index, counts, error)
       type(engine_type), intent(in) :: engine
       type(sweep_index), intent(inout) :: index
       type(sweep_counts), intent(in) :: counts
@@ -584,6 +583,6 @@ contains
          trim(merge(' ranks  ', ' process', engine%ranks%count > 1)))
       call print_line('cases   '//to_text(counts%done)//' done, '//to_text(counts%failed)//' failed')
       call print_line('file    '//engine%directory%path//'/'//result_name)
-   end subroutine tell_end
+   end subroutine print_end
 
 end module rodyn_sweep_engine

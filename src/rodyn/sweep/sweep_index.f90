@@ -8,16 +8,16 @@ module rodyn_sweep_index
    use rodyn_sweep_directory, only: sweep_directory
    use rodyn_sweep_journal, only: journal_content, read_journals, write_journal
    use rodyn_sweep_repair, only: repair_shard
-   use rodyn_sweep_notices, only: notice_list
    use rodyn_sweep_record, only: at_attempt, at_case, at_message, at_status, decode_record, is_sound, shortest_record
    use rodyn_sweep_shard, only: header_words, shard_extent, sift_shard
    use rodyn_sweep_writer, only: open_ending
-   use rodyn_text, only: ends_with, to_text
+   use rodyn_text, only: ends_with, joined, to_text
    implicit none (type, external)
    private
    public :: sweep_index
 
    integer, parameter :: name_length = 255
+   character(len=1), parameter :: nl = new_line('a')
    integer, parameter :: most_open = 64 !! files open at once while results are fetched
 
    type :: sweep_index
@@ -31,6 +31,7 @@ module rodyn_sweep_index
       integer, allocatable, private :: units(:)   !! of each file; 0: closed
       integer, private :: n_open = 0
       integer(i8) :: bytes = 0                !! of all shards
+      character(len=:), allocatable :: notices !! what the user should know of the directory, one line each
       type(journal_content), private :: journals
    contains
       procedure :: scan
@@ -44,7 +45,7 @@ module rodyn_sweep_index
 contains
 
    !> Read all shards. Those that are damaged, or left open by a dead process, are repaired first.
-   subroutine scan(self, directory, shape, n_cases, tag, others, all_shards, notices, error)
+   subroutine scan(self, directory, shape, n_cases, tag, others, all_shards, error)
       class(sweep_index), intent(out) :: self
       type(sweep_directory), intent(inout) :: directory
       type(case_shape), intent(in) :: shape
@@ -52,24 +53,24 @@ contains
       character(len=*), intent(in) :: tag    !! ours; findings are noted in its journal
       character(len=*), intent(in) :: others !! what the names of shards have whose writers may be alive, and ours; empty: none
       logical, intent(in) :: all_shards      !! read those of living writers, too, as far as they are sealed
-      type(notice_list), intent(inout) :: notices
       type(error_type), allocatable, intent(out) :: error
       character(len=name_length), allocatable :: faulty(:)
       integer :: i
 
       self%directory = directory%path
+      self%notices = ''
       do
          call read_all(self, directory%fingerprint, shape, n_cases, tag, others, all_shards, faulty)
          if (size(faulty) == 0) exit ! otherwise there are other files then
          call directory%begin_scan()
          do i = 1, size(faulty)
             if (.not. allocated(error)) call repair_shard(self%directory, trim(faulty(i)), tag, directory%fingerprint, shape, &
-                                                        n_cases, notices, error)
+                                                        n_cases, self%notices, error)
          end do
          call directory%end_scan()
          if (allocated(error)) return
       end do
-      if (all_shards .or. len(others) == 0) call tell_of_missing(self, tag, notices, error)
+      if (all_shards .or. len(others) == 0) call note_missing(self, tag, error)
    end subroutine scan
 
    !> Read and verify, and list what has to be repaired.
@@ -83,20 +84,20 @@ contains
       character(len=name_length), allocatable, intent(out) :: faulty(:)
       character(len=name_length), allocatable :: names(:)
       integer(i8), allocatable :: words(:)
-      logical, allocatable :: to_mend(:)
+      logical, allocatable :: to_repair(:)
       integer :: i, n
 
       call forget(self, n_cases)
       call list_directory(self%directory//'/shards', names)
       allocate (self%files(size(names)))
-      allocate (to_mend(size(names)), source=.false.)
+      allocate (to_repair(size(names)), source=.false.)
       n = 0
       do i = 1, size(names)
          if (ends_with(names(i), '.shard'//open_ending)) then
-            to_mend(i) = .not. may_live(names(i))
+            to_repair(i) = .not. may_live(names(i))
          else if (ends_with(names(i), '.shard') .and. (all_shards .or. .not. may_live(names(i)))) then
-            call read_sealed(self%directory//'/shards/'//trim(names(i)), to_mend(i))
-            if (to_mend(i)) cycle
+            call read_sealed(self%directory//'/shards/'//trim(names(i)), to_repair(i))
+            if (to_repair(i)) cycle
             n = n + 1
             self%files(n) = names(i)
             self%bytes = self%bytes + 8_i8*size(words)
@@ -105,7 +106,7 @@ contains
       end do
       self%files = self%files(:n)
       allocate (self%units(n), source=0)
-      faulty = pack(names, to_mend)
+      faulty = pack(names, to_repair)
 
    contains
 
@@ -140,10 +141,9 @@ contains
    end subroutine forget
 
    !> Shards that the journal knows but that are not there.
-   subroutine tell_of_missing(self, tag, notices, error)
+   subroutine note_missing(self, tag, error)
       class(sweep_index), intent(inout) :: self
       character(len=*), intent(in) :: tag
-      type(notice_list), intent(inout) :: notices
       type(error_type), allocatable, intent(out) :: error
       character(len=name_length), allocatable :: names(:)
       integer :: i
@@ -151,13 +151,13 @@ contains
       call read_journals(self%directory, self%journals)
       call self%journals%missing(self%directory, names)
       do i = 1, size(names)
-         call notices%tell('shard '//trim(names(i))//': sealed but missing; its cases are recomputed')
+         self%notices = joined(self%notices, 'shard '//trim(names(i))//': sealed but missing; its cases are recomputed', nl)
          call write_journal(self%directory, tag, 'gone', trim(names(i)), 0, 0_i8, error)
          if (allocated(error)) return
       end do
-      if (self%journals%n_damaged > 0) call notices%tell('journal: '//to_text(self%journals%n_damaged)// &
-                                                         ' damaged line(s) skipped')
-   end subroutine tell_of_missing
+      if (self%journals%n_damaged > 0) self%notices = joined(self%notices, 'journal: '// &
+         to_text(self%journals%n_damaged)//' damaged line(s) skipped', nl)
+   end subroutine note_missing
 
    !> Was this the checksum of sweep.h5 when it was merged, and from these very results?
    logical function has_merged(self, crc)

@@ -10,10 +10,9 @@ module rodyn_sweep_repair
    use rodyn_posix_files, only: file_bytes, read_words, rename_aside, write_words
    use rodyn_sweep_case, only: case_shape
    use rodyn_sweep_journal, only: write_journal
-   use rodyn_sweep_notices, only: notice_list
    use rodyn_sweep_shard, only: shard_extent, shard_header, shard_trailer, sift_shard
    use rodyn_sweep_writer, only: open_ending, seal_file
-   use rodyn_text, only: ends_with, to_text
+   use rodyn_text, only: ends_with, joined, to_text
    implicit none (type, external)
    private
    public :: repair_shard
@@ -28,7 +27,7 @@ contains
       integer(i8), intent(in) :: fingerprint
       type(case_shape), intent(in) :: shape
       integer, intent(in) :: n_cases
-      type(notice_list), intent(inout) :: notices
+      character(len=:), allocatable, intent(inout) :: notices !! what was found, one line each
       type(error_type), allocatable, intent(out) :: error
       integer(i8), allocatable :: words(:)
       type(shard_extent) :: extent
@@ -53,8 +52,8 @@ contains
          call finish(directory, sealed_name, tag, shard_header(fingerprint), extent, error)
       else
          call salvage(directory, name, sealed_name, tag, words(:extent%used), extent, error)
-         if (.not. allocated(error)) call notices%tell('shard '//name//': '//fault//'; set aside, '// &
-            to_text(extent%n_records)//' intact results of it are kept')
+         if (.not. allocated(error)) notices = joined(notices, 'shard '//name//': '//fault//'; set aside, '// &
+            to_text(extent%n_records)//' intact results of it are kept', new_line('a'))
       end if
    end subroutine repair_shard
 
