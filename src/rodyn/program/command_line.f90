@@ -24,17 +24,9 @@ module rodyn_command_line
    public :: run_command
 
    !> Options of all commands, as typed.
-   type :: options_type
-      character(len=:), allocatable :: file   !! the one positional argument
-      character(len=:), allocatable :: output !! --output
-      logical :: force = .false.
-      logical :: quiet = .false.
-      logical :: help = .false.
-      logical :: equilibrium = .false.
-      logical :: loads = .false.
-      character(len=:), allocatable :: shard  !! --shard
-      logical :: dry_run = .false.
-      logical :: retry_failed = .false.
+   type, extends(sweep_options) :: options_type
+      logical :: help = .false., equilibrium = .false., loads = .false.
+      character(len=:), allocatable :: shard_text !! of --shard
    end type options_type
 
    character(len=*), parameter :: nl = new_line('a')
@@ -152,18 +144,18 @@ contains
       type(options_type), intent(in) :: options
       type(error_type), allocatable, intent(out) :: error
       if (len(path) == 0 .and. .not. allocated(options%output)) then
-         call raise(error, name_wanted('FILE.h5'), exit_bad_input)
+         call raise(error, name_is_required('FILE.h5'), exit_bad_input)
       else if (options%file /= '-' .and. same_path(path, options%file)) then
          call raise(error, path//': is the case itself; give the result another name by --output', exit_bad_input)
       end if
    end subroutine refuse_input
 
    !> What is told where the input is a stream, and so gives the result no name.
-   function name_wanted(kind) result(text)
+   function name_is_required(kind) result(text)
       character(len=*), intent(in) :: kind !! of name
       character(len=:), allocatable :: text
       text = 'rodyn '//argument(1)//': the input is a stream without a name of its own; name the result by --output '//kind
-   end function name_wanted
+   end function name_is_required
 
    !> rodyn modes
    subroutine modes_command(options, error)
@@ -242,17 +234,13 @@ contains
       type(sweep_options) :: sweep
 
       exit_code = exit_bad_input
-      sweep%file = options%file
+      sweep = options%sweep_options
       sweep%output = result_name(options, trim(merge('-again', '      ', is_result_file(options%file))))
       if (len(sweep%output) == 0 .and. .not. allocated(options%output)) then
-         call raise(error, name_wanted('DIR'), exit_bad_input)
+         call raise(error, name_is_required('DIR'), exit_bad_input)
          return
       end if
-      sweep%dry_run = options%dry_run
-      sweep%retry_failed = options%retry_failed
-      sweep%force = options%force
-      sweep%quiet = options%quiet
-      if (allocated(options%shard)) call read_shard(options%shard, sweep%shard, sweep%n_shards, error)
+      if (allocated(options%shard_text)) call read_shard(options%shard_text, sweep%shard, sweep%n_shards, error)
       if (sweep%force .and. sweep%n_shards > 0 .and. .not. allocated(error)) &
          call raise(error, 'rodyn sweep: --force would remove the results of other shards; use it without --shard', &
                     exit_bad_input)
@@ -369,9 +357,9 @@ contains
                call raise(error, 'rodyn sweep: --shard needs I/N', exit_bad_input)
                return
             end if
-            options%shard = argument(i)
+            options%shard_text = argument(i)
          else if (index(word, '--shard=') == 1 .and. argument(1) == 'sweep') then
-            options%shard = word(len('--shard=') + 1:)
+            options%shard_text = word(len('--shard=') + 1:)
          else if ((word == '--output' .or. word == '-o') .and. argument(1) /= 'check') then
             i = i + 1
             if (i > command_argument_count()) then
