@@ -59,7 +59,7 @@ contains
 
       call self%begin(t, y, error)
       if (allocated(error)) return
-      call evaluate(self, t, self%y, self%f, ok)
+      call evaluate(self, t, self%y_good, self%f, ok)
       if (.not. ok) then
          call self%cannot_step(obstacle(self%refused), error)
       else if (self%grid%n == 0) then
@@ -113,11 +113,11 @@ contains
       real(wp) :: t
 
       if (.not. allocated(self%y_event)) allocate (self%y_event(self%system%n_states), source=0.0_wp)
-      call find_event(self, self%t_before, self%y_before, self%f_before, self%t, self%y, self%f, self%pending, t, self%y_event)
+      call find_event(self, self%t_before, self%y_before, self%f_before, self%t, self%y_good, self%f, self%pending, t, self%y_event)
       if (.not. self%pending) return
       self%t = t
       self%t_lost = 0.0_wp
-      self%y(:) = self%y_event
+      self%y_good(:) = self%y_event
       self%lost = 0.0_wp
       self%t_good = t
    end subroutine look_for_event
@@ -170,15 +170,15 @@ contains
       logical :: ok
 
       norm = huge(1.0_wp)
-      call stages(self%system, size(self%y), self%t, h, self%y, self%f, self%k, self%stage, ok)
+      call stages(self%system, size(self%y_good), self%t, h, self%y_good, self%f, self%k, self%stage, ok)
       self%counts%n_rhs = self%counts%n_rhs + n_stages - 1
       self%refused = .not. ok
       if (.not. ok) return
-      call add_increment(size(self%y), h, self%k, self%increment)
-      self%y_new(:) = self%y + (self%increment - self%lost)
+      call add_increment(size(self%y_good), h, self%k, self%increment)
+      self%y_new(:) = self%y_good + (self%increment - self%lost)
       if (.not. all(ieee_is_finite(self%y_new))) return
       norm = 0.0_wp
-      if (self%grid%n == 0) norm = error_norm(self%system%n_controlled, h, self%k(:self%system%n_controlled, :), self%y, &
+      if (self%grid%n == 0) norm = error_norm(self%system%n_controlled, h, self%k(:self%system%n_controlled, :), self%y_good, &
                                               self%y_new, self%inner%rtol, self%inner%atol)
       if (.not. ieee_is_finite(norm)) norm = huge(1.0_wp)
       if (norm > 1.0_wp) return
@@ -189,9 +189,9 @@ contains
    subroutine add_quadratures(self, h)
       class(dop853_integrator), intent(inout) :: self
       real(wp), intent(in) :: h !! step [s]
-      call control_quadratures(self, self%t, h, self%y)
+      call control_quadratures(self, self%t, h, self%y_good)
       associate (last => self%system%n_controlled + 1)
-         self%y_new(last:) = self%y(last:) + (self%increment(last:) - self%lost(last:))
+         self%y_new(last:) = self%y_good(last:) + (self%increment(last:) - self%lost(last:))
          call self%system%note_quadratures(self%y_new(last:), self%quadrature_error)
       end associate
    end subroutine add_quadratures
@@ -201,9 +201,9 @@ contains
       class(dop853_integrator), intent(inout) :: self
       real(wp), intent(in) :: h, t_new
 
-      self%lost = (self%y_new - self%y) - (self%increment - self%lost)
-      call swap(self%y_before, self%y)
-      call swap(self%y, self%y_new)
+      self%lost = (self%y_new - self%y_good) - (self%increment - self%lost)
+      call swap(self%y_before, self%y_good)
+      call swap(self%y_good, self%y_new)
       call swap(self%f_before, self%f)
       call swap(self%f, self%stage)
       call self%move_time(h, t_new)
@@ -239,11 +239,11 @@ contains
 
       associate (n => self%system%n_controlled, span => self%t_stop - self%t)
          if (span <= 0.0_wp) return
-         self%stage(:) = self%inner%atol + self%inner%rtol*abs(self%y)
-         d0 = norm2(self%y(:n)/self%stage(:n))/sqrt(real(n, wp))
+         self%stage(:) = self%inner%atol + self%inner%rtol*abs(self%y_good)
+         d0 = norm2(self%y_good(:n)/self%stage(:n))/sqrt(real(n, wp))
          d1 = norm2(self%f(:n)/self%stage(:n))/sqrt(real(n, wp))
          h0 = trial_step(d0, d1, span)
-         self%y_new(:) = self%y + h0*self%f
+         self%y_new(:) = self%y_good + h0*self%f
          call evaluate(self, self%t + h0, self%y_new, self%increment, ok)
          if (ok) then
             d2 = norm2((self%increment(:n) - self%f(:n))/self%stage(:n))/sqrt(real(n, wp))/h0

@@ -23,9 +23,8 @@ module rodyn_gauss_integrator
    use rodyn_one_step_integrator, only: one_step_integrator
    use rodyn_lane_algebra, only: multiply
    use rodyn_gauss_stages, only: gauss_stages, new_gauss_stages, reserve_modes, set_step, set_weights, iterate, nodes_from, &
-      swap_matrices, swap_records, most_iterations, typical_lambda
+      form_increment, neglected_of, swap_matrices, swap_records, most_iterations, typical_lambda, wanted_estimate
    use rodyn_gauss_guess, only: predict, choose_degree, renew_history
-   use rodyn_gauss_increment, only: form_increment, neglected_of, wanted_estimate
    implicit none (type, external)
    private
    public :: gauss_integrator, new_gauss_integrator
@@ -178,7 +177,7 @@ contains
       logical :: ok, rejected
 
       rejected = .false.
-      call set_weights(self%stages, self%y)
+      call set_weights(self%stages, self%y_good)
       do
          call self%permit_step(error)
          if (allocated(error)) return
@@ -199,14 +198,14 @@ contains
          call shorten(self, h, estimate, ok)
       end do
       if (modulo(self%n_steps, degree_interval) == 0) call choose_degree(self%stages)
-      if (self%system%has_quadratures()) call add_quadratures(self, self%t, self%y, ok)
+      if (self%system%has_quadratures()) call add_quadratures(self, self%t, self%y_good, ok)
       if (.not. ok) then
          call self%cannot_step(no_powers, error)
          return
       end if
       call accept(self, h, t_new)
       if (self%system%has_quadratures()) &
-         call self%system%note_quadratures(self%y(self%system%n_controlled + 1:), self%quadrature_error)
+         call self%system%note_quadratures(self%y_good(self%system%n_controlled + 1:), self%quadrature_error)
       if (self%grid%n == 0) call choose_next(self, h, t_new, estimate, rejected)
    end subroutine step
 
@@ -223,11 +222,11 @@ contains
             stages%modes%coupled = stages%now%coupled
             call renew_history(stages, self%grid%i > 0, self%y_before)
          end if
-         call predict(stages, self%t, self%y, self%counts, ok)
-         if (ok) call iterate(stages, self%t, self%y, self%counts, ok)
+         call predict(stages, self%t, self%y_good, self%counts, ok)
+         if (ok) call iterate(stages, self%t, self%y_good, self%counts, ok)
          estimate = huge(1.0_wp)
          if (.not. ok) return
-         call form_increment(stages, self%y, self%increment, estimate)
+         call form_increment(stages, self%y_good, self%increment, estimate)
          ok = all(ieee_is_finite(self%increment))
       end associate
    end subroutine try
@@ -302,7 +301,7 @@ contains
       weight = 0.0_wp
       if (h > 0.0_wp .and. self%grid%n == 0) slowest = smallest_phase/h
       if (h > 0.0_wp) weight = 1.0_wp/(typical_lambda*h)
-      call self%stages%mechanics%find_modes(self%y(:self%stages%mechanics%n_dof), slowest, weight, self%stages%modes, ok)
+      call self%stages%mechanics%find_modes(self%y_good(:self%stages%mechanics%n_dof), slowest, weight, self%stages%modes, ok)
       self%counts%n_jac = self%counts%n_jac + 1
       if (.not. ok) then
          call raise(error, 'gauss at t = '//time_text(self%t)//' s: mass matrix not positive definite')
@@ -385,11 +384,11 @@ contains
 
       self%stages%trial%h = h
       call swap_records(self%stages%last, self%stages%trial)
-      do i = 1, size(self%y)
-         self%y_before(i) = self%y(i)
-         y_new = self%y(i) + (self%increment(i) - self%lost(i))
-         self%lost(i) = (y_new - self%y(i)) - (self%increment(i) - self%lost(i))
-         self%y(i) = y_new
+      do i = 1, size(self%y_good)
+         self%y_before(i) = self%y_good(i)
+         y_new = self%y_good(i) + (self%increment(i) - self%lost(i))
+         self%lost(i) = (y_new - self%y_good(i)) - (self%increment(i) - self%lost(i))
+         self%y_good(i) = y_new
       end do
       call self%move_time(h, t_new)
       associate (stages => self%stages)

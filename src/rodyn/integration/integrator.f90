@@ -20,7 +20,7 @@ module rodyn_integrator
    use rodyn_text, only: time_text
    implicit none (type, external)
    private
-   public :: integrator_type, solver_options, solver_statistics, monitor_type
+   public :: integrator_type, stepping_integrator, solver_options, solver_statistics, monitor_type
    public :: tightened, cannot_evaluate
 
    !> Why a step of a mechanical system cannot be made.
@@ -57,6 +57,7 @@ module rodyn_integrator
       real(wp), allocatable :: y_good(:)  !! state there (n_states)
       integer(i8) :: n_steps = 0          !! internal steps of the whole run
       integer(i8) :: n_starts = 0
+      logical :: goes_on = .false.        !! the last start was from its own last state, whose lost digits may still be known
       logical :: at_event = .false.       !! the last `advance` ended at an event, the system must respond, and `start` follow
       logical :: pending = .false.        !! the steps have met an event, at t_good
       logical, allocatable :: crossed(:)  !! the event functions that became negative there (n_events)
@@ -78,6 +79,14 @@ module rodyn_integrator
       procedure :: count_as_steps
       procedure :: state_within
    end type integrator_type
+
+   !> One whose steps go past the times that are asked for: an output lies inside the last step.
+   type, abstract, extends(integrator_type) :: stepping_integrator
+   contains
+      procedure :: advance => advance_by_steps
+      procedure(step_interface), deferred :: step     !! one accepted step, not past the stop time
+      procedure(output_interface), deferred :: output !! the state inside the last step
+   end type stepping_integrator
 
    abstract interface
       !> First start, and every exact restart: forget the history and begin at (t, y). `set_stop` comes before.
@@ -101,6 +110,22 @@ module rodyn_integrator
          real(wp), intent(out) :: t    !! t_out, that of the event, or the last good time [s]
          type(error_type), allocatable, intent(out) :: error
       end subroutine advance_interface
+
+      subroutine step_interface(self, error)
+         import :: stepping_integrator, error_type
+         implicit none (type, external)
+         class(stepping_integrator), intent(inout) :: self
+         type(error_type), allocatable, intent(out) :: error
+      end subroutine step_interface
+
+      subroutine output_interface(self, t, y, error)
+         import :: stepping_integrator, error_type, wp
+         implicit none (type, external)
+         class(stepping_integrator), intent(inout) :: self
+         real(wp), intent(in) :: t !! [s]
+         real(wp), contiguous, intent(out) :: y(:) !! (n_states)
+         type(error_type), allocatable, intent(inout) :: error
+      end subroutine output_interface
 
       function statistics_interface(self) result(stats)
          import :: integrator_type, solver_statistics
@@ -184,6 +209,8 @@ contains
          call raise(error, 'start at t = '//time_text(t)//' s: the stop time '//time_text(self%t_stop)//' s lies before it')
       end if
       if (allocated(error)) return
+      self%goes_on = self%n_starts > 0
+      if (self%goes_on) self%goes_on = .not. any(abs(self%y_good - y) > 0.0_wp)
       self%t_good = t
       self%y_good = y
       self%n_starts = self%n_starts + 1
@@ -208,6 +235,27 @@ contains
          call raise(error, 'advance to t = '//time_text(t_out)//' s: beyond the stop time '//time_text(self%t_stop)//' s')
       end if
    end subroutine check_target
+
+   subroutine advance_by_steps(self, t_out, y, t, error)
+      class(stepping_integrator), intent(inout) :: self
+      real(wp), intent(in) :: t_out !! not after the stop time [s]
+      real(wp), contiguous, intent(out) :: y(:) !! (n_states)
+      real(wp), intent(out) :: t    !! t_out, that of an event, or the last good time [s]
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%check_target(t_out, error)
+      do while (.not. allocated(error) .and. self%t_good < t_out .and. .not. self%pending)
+         call self%step(error)
+      end do
+      self%at_event = self%pending .and. self%t_good <= t_out
+      if (.not. allocated(error) .and. t_out < self%t_good) then
+         t = t_out
+         call self%output(t_out, y, error)
+         if (.not. allocated(error)) return
+      end if
+      t = self%t_good
+      y(:) = self%y_good
+   end subroutine advance_by_steps
 
    !> The state at a time within the last internal step, as accurate as the steps. For `rodyn_event_search`.
    subroutine state_within(self, t, y, ok)

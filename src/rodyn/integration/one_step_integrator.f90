@@ -6,14 +6,14 @@ module rodyn_one_step_integrator
    use rodyn_errors, only: error_type, raise
    use rodyn_text, only: time_text
    use rodyn_ode, only: ode_system, n_quadratures
-   use rodyn_integrator, only: integrator_type, solver_options, solver_statistics
+   use rodyn_integrator, only: stepping_integrator, solver_options, solver_statistics
    use rodyn_quadrature_refinement, only: quadrature_refinement
    use rodyn_step_grid, only: step_grid
    implicit none (type, external)
    private
    public :: one_step_integrator
 
-   type, abstract, extends(integrator_type) :: one_step_integrator
+   type, abstract, extends(stepping_integrator) :: one_step_integrator
       character(len=6) :: name = ''      !! of the method, for messages
       type(solver_options) :: inner      !! tolerances of a step
       real(wp) :: t = 0.0_wp             !! end of the last step [s]
@@ -21,8 +21,7 @@ module rodyn_one_step_integrator
       real(wp) :: t_before = 0.0_wp      !! start of the last step [s]
       real(wp) :: h = 0.0_wp             !! next step [s]
       type(step_grid) :: grid            !! fixed steps
-      real(wp), allocatable :: y(:)      !! state at t (n_states)
-      real(wp), allocatable :: lost(:)   !! what rounding took from y so far (n_states)
+      real(wp), allocatable :: lost(:)   !! what rounding took from the state so far (n_states)
       real(wp), allocatable :: y_before(:)  !! state at t_before (n_states)
       real(wp), allocatable :: increment(:) !! of the state in a step (n_states)
       real(wp) :: quadrature_error(n_quadratures) = 0.0_wp !! in the last step
@@ -31,7 +30,6 @@ module rodyn_one_step_integrator
    contains
       procedure :: create
       procedure :: begin
-      procedure :: advance
       procedure :: change_step
       procedure :: move_time
       procedure :: quadrature_limit
@@ -39,27 +37,7 @@ module rodyn_one_step_integrator
       procedure :: cannot_step
       procedure :: statistics
       procedure :: finalize
-      procedure(step_interface), deferred :: step     !! one accepted step
-      procedure(output_interface), deferred :: output !! the state inside the last step
    end type one_step_integrator
-
-   abstract interface
-      subroutine step_interface(self, error)
-         import :: one_step_integrator, error_type
-         implicit none (type, external)
-         class(one_step_integrator), intent(inout) :: self
-         type(error_type), allocatable, intent(out) :: error
-      end subroutine step_interface
-
-      subroutine output_interface(self, t, y, error)
-         import :: one_step_integrator, error_type, wp
-         implicit none (type, external)
-         class(one_step_integrator), intent(inout) :: self
-         real(wp), intent(in) :: t !! [s]
-         real(wp), contiguous, intent(out) :: y(:) !! (n_states)
-         type(error_type), allocatable, intent(inout) :: error
-      end subroutine output_interface
-   end interface
 
 contains
 
@@ -77,7 +55,7 @@ contains
       self%name = name
       self%counts%last_order = order
       associate (n => system%n_states)
-         allocate (self%y(n), self%lost(n), self%y_before(n), self%increment(n), source=0.0_wp)
+         allocate (self%lost(n), self%y_before(n), self%increment(n), source=0.0_wp)
       end associate
    end subroutine create
 
@@ -93,34 +71,9 @@ contains
       self%t = t
       self%t_before = t
       self%t_lost = 0.0_wp
-      if (self%n_starts == 1 .or. any(abs(self%y - y) > 0.0_wp)) then
-         self%y(:) = y
-         self%lost = 0.0_wp
-      end if ! else the run goes on from its own last state, whose lost digits are still known
+      if (.not. self%goes_on) self%lost = 0.0_wp
       call self%grid%lay(t, self%t_stop, self%options%fixed_step, error)
    end subroutine begin
-
-   !> Integrate to exactly t_out.
-   subroutine advance(self, t_out, y, t, error)
-      class(one_step_integrator), intent(inout) :: self
-      real(wp), intent(in) :: t_out !! not after the stop time [s]
-      real(wp), contiguous, intent(out) :: y(:) !! (n_states)
-      real(wp), intent(out) :: t    !! t_out, or the last good time [s]
-      type(error_type), allocatable, intent(out) :: error
-
-      call self%check_target(t_out, error)
-      do while (.not. allocated(error) .and. self%t < t_out .and. .not. self%pending)
-         call self%step(error)
-      end do
-      self%at_event = self%pending .and. self%t <= t_out
-      if (.not. allocated(error) .and. t_out < self%t) then
-         t = t_out
-         call self%output(t_out, y, error)
-         if (.not. allocated(error)) return
-      end if
-      t = self%t
-      y(:) = self%y
-   end subroutine advance
 
    !> Choose the next step. A step cut short by the stop time says little about it.
    subroutine change_step(self, h, factor, t_new)

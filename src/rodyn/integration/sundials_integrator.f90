@@ -6,7 +6,7 @@ module rodyn_sundials_integrator
    use rodyn_errors, only: error_type, raise
    use rodyn_text, only: time_text
    use rodyn_ode, only: ode_system, n_quadratures
-   use rodyn_integrator, only: integrator_type, solver_options, solver_statistics
+   use rodyn_integrator, only: stepping_integrator, solver_options, solver_statistics
    use rodyn_event_search, only: find_event
    use rodyn_nvector, only: new_nvector, free_nvector, vector_content, content_of
    use rodyn_sundials_base, only: callback_data, all_finite, check
@@ -17,7 +17,7 @@ module rodyn_sundials_integrator
    public :: sundials_integrator
 
    !> Owns every handle of the library. Do not copy by assignment.
-   type, abstract, extends(integrator_type) :: sundials_integrator
+   type, abstract, extends(stepping_integrator) :: sundials_integrator
       type(c_ptr) :: context = c_null_ptr
       type(c_ptr) :: memory = c_null_ptr        !! the library's integrator
       logical :: initialized = .false.          !! it has all it needs, and may be restarted
@@ -32,7 +32,7 @@ module rodyn_sundials_integrator
       type(solver_statistics) :: before_restart !! counts up to the last restart
    contains
       procedure :: start
-      procedure :: advance
+      procedure :: step
       procedure :: finalize
       procedure :: create
       procedure :: look_for_event
@@ -42,7 +42,6 @@ module rodyn_sundials_integrator
       procedure(plain_interface), deferred :: set_library_stop !! let the library know `t_stop`
       procedure(evolve_interface), deferred :: evolve       !! one step of the library
       procedure(plain_interface), deferred :: complete_step !! quadratures and events of a step
-      procedure(output_interface), deferred :: output       !! the state inside the last step
       procedure(plain_interface), deferred :: rates_at_ends !! f_before and f_after
       procedure(free_interface), deferred :: free_memory    !! `memory` and what belongs to it
    end type sundials_integrator
@@ -70,15 +69,6 @@ module rodyn_sundials_integrator
          real(wp), intent(out) :: t_reached !! [s]
          type(error_type), allocatable, intent(inout) :: error
       end subroutine evolve_interface
-
-      subroutine output_interface(self, t, y, error)
-         import :: sundials_integrator, error_type, wp
-         implicit none (type, external)
-         class(sundials_integrator), intent(inout) :: self
-         real(wp), intent(in) :: t !! [s]
-         real(wp), contiguous, intent(out) :: y(:) !! (n_states)
-         type(error_type), allocatable, intent(inout) :: error
-      end subroutine output_interface
 
       subroutine free_interface(self)
          import :: sundials_integrator
@@ -137,39 +127,18 @@ contains
       self%initialized = self%initialized .or. .not. allocated(error)
    end subroutine start
 
-   !> Step past t_out, but never past the stop time; an output lies inside the last step.
-   subroutine advance(self, t_out, y, t, error)
+   !> One step of the library, which is told of a new stop time first.
+   subroutine step(self, error)
       class(sundials_integrator), intent(inout) :: self
-      real(wp), intent(in) :: t_out !! [s]
-      real(wp), contiguous, intent(out) :: y(:) !! (n_states)
-      real(wp), intent(out) :: t    !! [s]
       type(error_type), allocatable, intent(out) :: error
 
-      call self%check_target(t_out, error)
-      if (.not. allocated(error)) call check_stop(self, error)
-      do while (.not. allocated(error) .and. self%t_good < t_out .and. .not. self%pending)
-         call self%permit_step(error)
-         if (.not. allocated(error)) call one_step(self, error)
-      end do
-      self%at_event = self%pending .and. self%t_good <= t_out
-      if (.not. allocated(error) .and. t_out < self%t_good) then
-         t = t_out
-         call self%output(t_out, y, error)
-         if (.not. allocated(error)) return
+      if ((self%stop_in_force < self%t_stop .or. self%stop_in_force > self%t_stop) .and. self%t_stop > self%t_good) then
+         call self%set_library_stop(error)
+         if (.not. allocated(error)) self%stop_in_force = self%t_stop
       end if
-      y(:) = self%y_good
-      t = self%t_good
-   end subroutine advance
-
-   !> Tell the library a new stop time, if it is one.
-   subroutine check_stop(self, error)
-      class(sundials_integrator), intent(inout) :: self
-      type(error_type), allocatable, intent(inout) :: error
-      if (.not. (self%stop_in_force < self%t_stop .or. self%stop_in_force > self%t_stop)) return
-      if (.not. self%t_stop > self%t_good) return
-      call self%set_library_stop(error)
-      if (.not. allocated(error)) self%stop_in_force = self%t_stop
-   end subroutine check_stop
+      if (.not. allocated(error)) call self%permit_step(error)
+      if (.not. allocated(error)) call one_step(self, error)
+   end subroutine step
 
    !> One internal step of the library.
    subroutine one_step(self, error)
