@@ -16,7 +16,7 @@ module rodyn_method_choice
       fast_rates, n_even, vibrating
    use rodyn_method_numbers, only: even_lead, lead, lead_over_events, mostly_damped, short_run, stiff_damped_from, stiff_from, &
       stiff_power
-   use rodyn_method_trial, only: try_methods
+   use rodyn_method_trial, only: trial_type, try_methods
    implicit none (type, external)
    private
    public :: method_choice, choose_method, named_method
@@ -43,7 +43,7 @@ contains
    subroutine choose_method(choice, options, motion, y, t, t_end, n_outputs, out, most_trial, monitor)
       type(method_choice), intent(out) :: choice
       type(solver_options), intent(in) :: options !! of the user
-      type(motion_type), intent(in) :: motion     !! in the regime that begins or goes on at t
+      type(motion_type), target, intent(in) :: motion !! in the regime that begins or goes on at t
       real(wp), intent(in) :: y(:)     !! state at t, without quadratures
       real(wp), intent(in) :: t, t_end !! until when it shall serve [s]
       integer, intent(in) :: n_outputs !! states between steps that are wanted meanwhile
@@ -51,6 +51,7 @@ contains
       real(wp), intent(in) :: most_trial !! effort that a trial may cost
       class(monitor_type), target, intent(inout), optional :: monitor !! of the run; what is chosen after a stop is of no use
       real(wp) :: span, ratio, wanted, expected(n_even), forecast(size(candidates)), outputs(size(candidates))
+      type(trial_type) :: trial
       logical :: available(n_even)
       integer :: best, i
 
@@ -79,10 +80,11 @@ contains
             choice%steps = expected_steps(collocation, options, rates, span)
             return
          end if
-         call try_methods(motion, y, t, options, minval([t_end, pack(motion%switches, motion%switches > t)]), t_end, rates, &
-                          expected, vibrating(rates, span)*span, out, most_trial, forecast, choice%effort, choice%conclusive, &
-                          monitor)
       end associate
+      call describe(trial)
+      call try_methods(trial, most_trial, choice%effort)
+      choice%conclusive = trial%conclusive
+      forecast = trial%forecast
       if (.not. choice%conclusive) return
       choice%pace = span/minval(forecast(:n_even))
       wanted = merge(lead_over_events, lead, motion%events%watches)
@@ -92,6 +94,24 @@ contains
       choice%tried = .true.
       call take(choice, best)
       choice%advantage = min(forecast(explicit)*wanted/forecast(best), 1.0e9_wp)
+
+   contains
+
+      subroutine describe(trial)
+         type(trial_type), intent(inout) :: trial
+         trial%motion => motion
+         trial%y = y
+         trial%options = options
+         trial%t = t
+         trial%t_first = minval([t_end, pack(motion%switches, motion%switches > t)])
+         trial%t_end = t_end
+         trial%rates = choice%rates
+         trial%expected = expected
+         trial%quiet_after = vibrating(choice%rates, span)*span
+         trial%out = out
+         if (present(monitor)) trial%monitor => monitor
+      end subroutine describe
+
    end subroutine choose_method
 
    !> Choose a candidate.

@@ -15,7 +15,7 @@ module rodyn_method_trial
    use rodyn_motion, only: motion_type
    implicit none (type, external)
    private
-   public :: try_methods
+   public :: trial_type, try_methods
 
    !> Passes on that someone wants an end, and no more: what a trial reports is not the run.
    type, extends(monitor_type) :: trial_monitor
@@ -38,22 +38,28 @@ module rodyn_method_trial
       logical :: failed = .false.
    end type runner
 
-   !> A trial on its way; see `try_methods`.
+   !> A trial: what it is of, for the caller to say, and how far it has come.
    type :: trial_type
-      type(trial_monitor) :: listener
-      type(runner) :: runners(size(candidates))
-      real(wp) :: forecast(size(candidates)) = huge(1.0_wp) !! effort of each on the whole run
-      integer :: best = n_even + 1     !! implicit method
-      real(wp) :: first = 0.0_wp       !! effort of a candidate in the first round
-      real(wp) :: allowed = 0.0_wp     !! up to the end of the present one
-      type(motion_type), pointer :: motion => null() !! not owned
-      real(wp), allocatable :: y(:)
+      type(motion_type), pointer :: motion => null() !! not owned; in the regime that begins or goes on at t
+      real(wp), allocatable :: y(:)                  !! state at t, without quadratures
       type(solver_options) :: options
+      real(wp) :: t = 0.0_wp                         !! start [s]
+      real(wp) :: t_first = 0.0_wp                   !! end of the trial at the latest; no load switches before [s]
+      real(wp) :: t_end = 0.0_wp                     !! end of the run [s]
       type(fast_rates) :: rates
-      real(wp) :: expected(n_even) = 0.0_wp
-      real(wp) :: t = 0.0_wp, t_first = 0.0_wp, t_end = 0.0_wp !! [s]
-      logical :: calms_down = .false.  !! dampers will calm the vibrations
-      real(wp) :: calm_after = 0.0_wp  !! what is seen after this time is no longer them [s]
+      real(wp) :: expected(n_even) = 0.0_wp          !! effort of the even methods; huge: of no use here
+      real(wp) :: quiet_after = 0.0_wp               !! time in which dampers will have calmed the fastest vibrations [s]
+      logical :: out(size(candidates)) = .false.     !! candidates of no use
+      class(monitor_type), pointer :: monitor => null() !! may end the trial, which then tells nothing
+      real(wp) :: forecast(size(candidates)) = huge(1.0_wp) !! effort of each on the whole run
+      logical :: conclusive = .true.   !! otherwise the effort it may cost has ended it, and the forecasts are worth little
+      type(trial_monitor), private :: listener
+      type(runner), private :: runners(size(candidates))
+      integer, private :: best = n_even + 1          !! implicit method
+      real(wp), private :: first = 0.0_wp            !! effort of a candidate in the first round
+      real(wp), private :: allowed = 0.0_wp          !! up to the end of the present one
+      logical, private :: calms_down = .false.       !! dampers will calm the vibrations
+      real(wp), private :: calm_after = 0.0_wp       !! what is seen after this time is no longer them [s]
    end type trial_type
 
 contains
@@ -66,56 +72,31 @@ contains
    !> and the trial ends when the best has a share of its run behind it. The pace of the even methods is known to a factor of 3
    !> beforehand; only where that leaves a doubt at the end they are tried, too (and collocation from the first where dampers calm
    !> the vibrations).
-   subroutine try_methods(motion, y, t, options, t_first, t_end, rates, expected, quiet_after, out, most, forecast, effort, &
-                          conclusive, monitor)
-      type(motion_type), target, intent(in) :: motion !! in the regime that begins or goes on at t
-      real(wp), intent(in) :: y(:)                  !! state at t, without quadratures
-      real(wp), intent(in) :: t                     !! [s]
-      type(solver_options), intent(in) :: options
-      real(wp), intent(in) :: t_first               !! end of the trial at the latest; no load switches before [s]
-      real(wp), intent(in) :: t_end                 !! [s]
-      type(fast_rates), intent(in) :: rates
-      real(wp), intent(in) :: expected(n_even)      !! effort of the even methods; huge: of no use here
-      real(wp), intent(in) :: quiet_after           !! time in which dampers will have calmed the fastest vibrations [s]
-      logical, intent(in) :: out(size(candidates))  !! those of no use
-      real(wp), intent(in) :: most                  !! effort that the trial may cost
-      real(wp), intent(out) :: forecast(size(candidates))
-      real(wp), intent(out) :: effort               !! spent on the trial
-      logical, intent(out) :: conclusive            !! otherwise `most` ended it, and the forecasts are worth little
-      class(monitor_type), target, intent(inout), optional :: monitor !! may end the trial, which then tells nothing
-      type(trial_type), target :: trial
+   subroutine try_methods(trial, most, effort)
+      type(trial_type), target, intent(inout) :: trial
+      real(wp), intent(in) :: most    !! effort that the trial may cost
+      real(wp), intent(out) :: effort !! spent on it
 
-      if (present(monitor)) trial%listener%outer => monitor
-      trial%motion => motion
-      trial%y = y
-      trial%options = options
-      trial%t = t
-      trial%t_first = t_first
-      trial%t_end = t_end
-      trial%calm_after = calm_after*quiet_after
-      trial%calms_down = t + quiet_after < t_end
-      trial%rates = rates
-      trial%expected = expected
-      trial%runners%reached = t
-      trial%runners%failed = out
-      trial%forecast(:n_even) = expected
-      trial%first = min(first_effort, first_share*minval(expected))
-      call run_rounds(trial, most, conclusive)
-      forecast = trial%forecast
+      trial%listener%outer => trial%monitor
+      trial%calm_after = calm_after*trial%quiet_after
+      trial%calms_down = trial%t + trial%quiet_after < trial%t_end
+      trial%runners%reached = trial%t
+      trial%runners%failed = trial%out
+      trial%forecast(:n_even) = trial%expected
+      trial%first = min(first_effort, first_share*minval(trial%expected))
+      call run_rounds(trial, most)
       effort = sum(trial%runners%effort)
       call end_trial(trial)
    end subroutine try_methods
 
    !> Round after round, until what is known is enough, or as much as it may cost. Before the last one the even methods are tried.
-   subroutine run_rounds(trial, most, conclusive)
+   subroutine run_rounds(trial, most)
       type(trial_type), target, intent(inout) :: trial
       real(wp), intent(in) :: most
-      logical, intent(out) :: conclusive
       logical :: over, even_tried
 
       trial%allowed = trial%first
       even_tried = .false.
-      conclusive = .true.
       do
          call follow_collocation(trial)
          call try_implicit(trial)
@@ -126,8 +107,8 @@ contains
             even_tried = .true.
             if (over .or. is_spent(trial)) exit
          end if
-         conclusive = after_next_round(trial) <= most
-         if (.not. conclusive) exit
+         trial%conclusive = after_next_round(trial) <= most
+         if (.not. trial%conclusive) exit
          trial%allowed = 2.0_wp*trial%allowed
       end do
    end subroutine run_rounds
