@@ -48,9 +48,7 @@ contains
    pure function integer_text(i) result(text)
       integer, intent(in) :: i
       character(len=:), allocatable :: text
-      character(len=12) :: digits
-      write (digits, '(i0)') i
-      text = trim(digits)
+      text = long_text(int(i, i8))
    end function integer_text
 
    pure function long_text(i) result(text)

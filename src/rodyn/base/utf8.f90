@@ -53,14 +53,10 @@ contains
       if (len(bytes) < 3) return
       second = ichar(bytes(2:2))
       select case (ichar(bytes(1:1)))
-      case (224)
-         if (second < 160) is_tail = .false.
-      case (237)
-         if (second > 159) is_tail = .false.
-      case (240)
-         if (second < 144) is_tail = .false.
-      case (244)
-         if (second > 143) is_tail = .false.
+      case (224, 240) ! overlong
+         is_tail = is_tail .and. second >= merge(160, 144, ichar(bytes(1:1)) == 224)
+      case (237, 244) ! halves of UTF-16 pairs; beyond the last code
+         is_tail = is_tail .and. second <= merge(159, 143, ichar(bytes(1:1)) == 237)
       case default
          continue
       end select

@@ -480,11 +480,7 @@ contains
       value_type = text_type(len(value), h5t_str_nullpad_f, h5t_cset_utf8_f)
       call new_attribute(self, object, name, value_type, attribute)
       if (.not. allocated(self%error)) then
-         if (len(value) > 0) then
-            call h5awrite_f(attribute, value_type, value, [1_hsize_t], status)
-         else
-            call h5awrite_f(attribute, value_type, achar(0), [1_hsize_t], status)
-         end if
+         call h5awrite_f(attribute, value_type, value//achar(0), [1_hsize_t], status) ! as much of it as the type is long
          call self%note(status, 'h5awrite_f', object//'@'//name)
          call h5aclose_f(attribute, status)
       end if
