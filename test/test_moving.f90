@@ -51,6 +51,7 @@ contains
                new_test('adams, bdf, erk and dop853 find the same events', test_methods_agree), &
                new_test('energy balances through events in every kind of scene', test_energy_everywhere), &
                new_test('Jacobian equals central differences beside stops and friction', test_jacobian), &
+               new_test('curved laws have their tangents where the joints of the state are', test_tangents), &
                new_test('events without end are refused', test_chatter), &
                new_test('collocation refuses events', test_gauss_refuses), &
                new_test('collocation takes hinges that are prestressed, held and released at a time', test_gauss_takes), &
@@ -713,6 +714,60 @@ contains
          if (allocated(error)) return
       end do
    end subroutine test_jacobian
+
+   !> Laws that are called curved though they are not: nothing changes, but that they know rotations and rates of the state that the
+   !> right-hand side, or the power, was asked for last.
+   subroutine test_tangents(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_config) :: config
+      type(scene_type) :: scene
+      type(motion_type) :: motion
+      real(wp), allocatable :: y(:), f(:), g(:)
+      real(wp) :: power(2), same(2)
+      integer :: which
+      logical :: ok
+
+      call seed_random(8)
+      do which = 1, n_kinds
+         call eventful_case(config, which, 3)
+         if (config%model%bending == 'quasistatic') cycle
+         config%initial%phi = [0.2_wp, 0.4_wp, 0.45_wp]
+         config%initial%phi_rate = [1.0_wp, -1.0_wp, 3.0_wp]
+         config%kink_programs = [kink_config(hinge=1, law='sine', t_end=1.0_wp, value=0.1_wp, rate=2.0_wp)]
+         call new_scene(scene, config, error)
+         if (.not. allocated(error)) call new_motion(motion, scene, .true., error)
+         if (allocated(error)) return
+         call initial_state(motion, config%initial, y)
+         call motion%begin_regime(0.0_wp, 1.0_wp, 1.0_wp, y, error)
+         if (allocated(error)) return
+         f = y
+         g = y
+         call motion%rhs(0.3_wp, y, f, ok)
+         call motion%quadratures(0.4_wp, y + 0.01_wp*f, power, ok)
+         motion%dynamics%hinges%curved = .true.
+         call motion%dynamics%set_regime(0.0_wp, 1.0_wp)
+         call motion%rhs(0.3_wp, y, g, ok)
+         call check_joints(0.3_wp, y)
+         call motion%quadratures(0.4_wp, y + 0.01_wp*f, same, ok)
+         call check_joints(0.4_wp, y + 0.01_wp*f)
+         call check_close(error, [g, same], [f, power], 0.0_wp, kind_name(which)//': rates, powers')
+         if (allocated(error)) return
+      end do
+
+   contains
+
+      subroutine check_joints(t, state)
+         real(wp), intent(in) :: t, state(:)
+         real(wp), dimension(3) :: theta, theta_rate
+         if (allocated(error)) return
+         call motion%dynamics%move_kinks(t)
+         call motion%dynamics%hinge_rotations(state(:motion%n_q), state(motion%n_q + 1:), theta, theta_rate)
+         associate (mechanisms => motion%dynamics%hinges%mechanisms)
+            call check_close(error, [mechanisms%theta, mechanisms%theta_rate], [theta, theta_rate], 0.0_wp, kind_name(which))
+         end associate
+      end subroutine check_joints
+
+   end subroutine test_tangents
 
    subroutine test_chatter(error)
       type(error_type), allocatable, intent(out) :: error

@@ -40,7 +40,7 @@ module rodyn_accelerations
       type(load_forces) :: forces      !! their values
       integer :: path = path_flexible  !! which kernel
       logical :: needs_moments = .true. !! the kernel does not form them itself
-      logical :: varying = .false.     !! some load or kink changes within the regime
+      logical :: varying = .false.     !! some load or kink changes within the regime, or tangents of hinge laws do
       type(kink_regime) :: kinks       !! programs of kinks that move between the last switch and the next
       logical :: driven = .false.      !! there are some
       real(wp), allocatable, dimension(:) :: kink, kink_rate, kink_acceleration !! (0:n-1); allocated if the scene has programs
@@ -78,7 +78,8 @@ contains
       dynamics%hinges = scene%hinges
       if (present(hinges)) dynamics%hinges = hinges
       call new_workspace(dynamics%work, scene)
-      allocate (dynamics%forces%node(2, 0))
+      allocate (dynamics%forces%node(2, 0), dynamics%regime%varying(0))
+      dynamics%varying = dynamics%hinges%curved
       allocate (dynamics%opening_acceleration(0:scene%n - 1), source=0.0_wp)
       if (dynamics%hinges%driven) then
          allocate (dynamics%kink(0:scene%n - 1), dynamics%kink_rate(0:scene%n - 1), dynamics%kink_acceleration(0:scene%n - 1), &
@@ -145,7 +146,7 @@ contains
          self%driven = size(self%kinks%moving) > 0
          call self%move_kinks(t_from)
       end if
-      self%varying = size(self%regime%varying) > 0 .or. self%driven .or. associated(self%user)
+      self%varying = size(self%regime%varying) > 0 .or. self%driven .or. associated(self%user) .or. self%hinges%curved
    end subroutine set_regime
 
    !> Forces on nodes for a load of the user's.
@@ -157,13 +158,16 @@ contains
       allocate (self%regime%constant_node(2, self%scene%n), source=0.0_wp)
    end subroutine make_room_for_user
 
-   !> All that changes with time, and the user's load with the state. Allocates nothing.
+   !> All that changes with time, and the user's load and curved hinge laws with the state. Allocates nothing without these laws.
    subroutine refresh(self, t, q, p)
       class(dynamics_type), intent(inout) :: self
       real(wp), intent(in) :: t !! [s]
       real(wp), intent(in) :: q(self%scene%n_q), p(self%scene%n_dof)
 
       if (self%driven) call self%move_kinks(t)
+      associate (first => self%scene%n_base + 1)
+         if (self%hinges%curved) call self%hinges%follow(self%scene%dynamic_bending, q(first), p(first))
+      end associate
       if (associated(self%user)) then
          self%forces%base(:) = self%regime%constant_base
          self%forces%node(:, :) = self%regime%constant_node

@@ -60,10 +60,12 @@ contains
       type(newton_solver) :: solver
       real(wp), allocatable :: start(:)
 
-      if (motion%dynamics%varying) then
-         call raise(error, 'no equilibrium: a load or a kink varies in time')
-         return
-      end if
+      associate (dynamics => motion%dynamics)
+         if (size(dynamics%regime%varying) > 0 .or. dynamics%driven .or. associated(dynamics%user)) then
+            call raise(error, 'no equilibrium: a load or a kink varies in time')
+            return
+         end if
+      end associate
       call new_newton_solver(solver, motion, error)
       if (allocated(error)) return
       associate (b => motion%dynamics%scene%n_base, r => motion%n_q, m => motion%n_dof)

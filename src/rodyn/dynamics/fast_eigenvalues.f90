@@ -116,6 +116,7 @@ contains
       at_rest = 0.0_wp
       at_rest(first:last) = q(first:last)
       call openings(scene%n, scene%dynamic_bending, at_rest(first:), opening)
+      if (relaxed%curved) call relaxed%follow(scene%dynamic_bending, at_rest(first:), 0.0_wp*at_rest(first:))
       call relaxed%rest_at(opening)
    end subroutine relax
 

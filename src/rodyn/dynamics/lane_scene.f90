@@ -50,7 +50,7 @@ contains
       type(scene_type), intent(in) :: scene
       type(hinge_law), intent(in) :: hinges !! as they are now
       suits_lanes = .not. scene%assembled .and. size(hinges%relaxing) == 0 .and. .not. hinges%has_locks .and. &
-                    scene%n_bend < 3 .and. .not. scene%condensed
+                    .not. hinges%curved .and. scene%n_bend < 3 .and. .not. scene%condensed
       if (scene%quasistatic) suits_lanes = suits_lanes .and. .not. hinges%driven .and. size(hinges%mechanisms) == 0
    end function suits_lanes
 

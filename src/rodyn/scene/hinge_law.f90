@@ -41,6 +41,7 @@ module rodyn_hinge_law
       logical :: driven = .false.           !! some kink moves
       logical :: has_offsets = .false.      !! some offset may not be zero
       logical :: has_friction = .false.     !! some f /= 0
+      logical :: curved = .false.           !! some law is not linear between events: C, D, t0 and f are those of its tangents
       logical :: quasistatic = .false.      !! rods bend without inertia
       type(three_moments) :: series         !! hinges and rods in series, when quasistatic
       integer, allocatable :: relaxing(:)   !! hinges whose rotation is a state (only quasistatic, exact dampers)
@@ -55,6 +56,7 @@ module rodyn_hinge_law
       procedure :: find_locks
       procedure :: rest_at
       procedure :: set_kinks
+      procedure :: follow
       procedure :: set_mechanisms
    end type hinge_law
 
@@ -96,8 +98,28 @@ contains
             call new_mechanism(law%mechanisms(k), hinges(k), chain, quasistatic .and. .not. exact_dampers)
          end do
       end if
+      law%curved = .not. all(law%mechanisms%is_linear())
       call law%set_mechanisms()
    end subroutine new_hinge_law
+
+   !> Take the tangents of curved laws at a state between rods whose bending is rigid or dynamic.
+   subroutine follow(self, flexible, angle, angle_rate)
+      class(hinge_law), intent(inout) :: self
+      logical, intent(in) :: flexible
+      real(wp), intent(in) :: angle(*), angle_rate(*) !! as of `hinge_moments`
+      real(wp), dimension(0:self%n - 1) :: opening, opening_rate
+      integer :: i
+
+      call openings(self%n, flexible, angle, opening)
+      call openings(self%n, flexible, angle_rate, opening_rate)
+      do i = 1, size(self%mechanisms)
+         associate (mechanism => self%mechanisms(i), k => self%mechanisms(i)%hinge)
+            mechanism%theta = opening(k) - self%kink(k)
+            mechanism%theta_rate = opening_rate(k) - self%kink_rate(k)
+         end associate
+      end do
+      call self%set_mechanisms()
+   end subroutine follow
 
    !> Compile the laws that the mechanisms have now.
    subroutine set_mechanisms(self)
@@ -222,6 +244,7 @@ contains
       class(hinge_law), intent(inout) :: self
       real(wp), intent(in) :: opening(0:) !! (0:n-1) [rad]
       self%driven = .false.
+      self%curved = .false.
       self%has_offsets = .true.
       self%constant = 0.0_wp
       self%friction = 0.0_wp

@@ -1,7 +1,8 @@
 !> Spring and damper of a hinge with a `&hinge` group: their form stands here and nowhere else.
 !>
 !> For the joint rotation th, rest angle a and freeplay g the spring has Ci (th - a) for |th - a| < g and
-!> +-Ci g + C (th - a -+ g) beyond; the damper has D th'.
+!> +-Ci g + C (th - a -+ g) beyond; the damper has D th'. A
+!> curved one gives its tangents at the last state, which pass the moment there exactly (`follow` of `rodyn_hinge_law`).
 module rodyn_hinge_spring
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: hinge_config
@@ -14,7 +15,10 @@ module rodyn_hinge_spring
       real(wp) :: stiffness = 0.0_wp  !! C [N m/rad]
       real(wp) :: damping = 0.0_wp    !! D [N m s/rad]
       integer :: side = 1             !! of the freeplay: -1, 0 within, 1
+      real(wp) :: theta = 0.0_wp      !! th of the last state [rad], and
+      real(wp) :: theta_rate = 0.0_wp !! th' [rad/s]: where curved laws have their tangents
    contains
+      procedure :: is_linear
       procedure :: linear_moment
       procedure :: spring_energy
       procedure :: choose_side
@@ -23,6 +27,13 @@ module rodyn_hinge_spring
    end type hinge_spring
 
 contains
+
+   !> Are spring and damper straight from event to event? So are all that there are.
+   elemental logical function is_linear(self)
+      class(hinge_spring), intent(in) :: self
+      associate (unused => self); end associate
+      is_linear = .true.
+   end function is_linear
 
    !> Spring and damper as they are now, T = C th + D th' + t0 + f.
    pure subroutine linear_moment(self, stiffness, damping, constant, friction)

@@ -143,6 +143,10 @@ contains
       call new_hinge_law(scene%hinges, config%chain, reshape([(scene%rods(scene%rod_of(k))%flexibility, k=1, scene%n)], &
                                                              [3, scene%n]), scene%quasistatic, config%model%dampers == 'exact', &
                          size(scene%kinks%programs) > 0, config%hinges)
+      if (scene%hinges%curved .and. (scene%quasistatic .or. scene%assembled)) then
+         call raise(error, "&hinge: a curved law needs kernel = 'recursive' and bending = 'dynamic' or 'rigid'", exit_bad_input)
+         return
+      end if
       scene%n_q = scene%n_dof + size(scene%hinges%relaxing)
       call new_load_set(scene%loads, config%loads)
       call collect_switches(scene, config%t_end)
