@@ -38,7 +38,7 @@ contains
          new_test('free hinges are mechanisms, not small frequencies', free_hinges), &
          new_test('a kink that moves later changes no mode at the start', later_kink), &
          new_test('equilibria are at rest', equilibria), &
-         new_test('damped motion ends at the equilibrium', damped_motion), &
+         new_test('damped motion ends at the equilibrium', damped_motion, long=.true.), &
          new_test('a torque on a free spacecraft leaves no equilibrium', no_equilibrium), &
          new_test('a rod on a hinge without spring rests where it is, or in line with its force', no_stiffness)]
    end subroutine collect_modes

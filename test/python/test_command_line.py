@@ -3,7 +3,6 @@
 RODYN=path  the program under test; otherwise bin/rodyn.
 """
 
-import gc
 import os
 import pathlib
 import re
@@ -839,7 +838,7 @@ def test_a_state_that_becomes_infinite_ends_a_run(tmp_path, method):
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_every_scene_gives_all_states_with_units(results, scene):
-    with xarray.open_dataset(results[scene][0]) as run:
+    with result_files.read(results[scene][0]) as run:
         n = 1 if scene.startswith("one") else 3
         assert dict(run.sizes) == {"time": 6, "rod": n, "hinge": n, "node": n + 1}
         assert run.rod.values.tolist() == list(range(1, n + 1))
@@ -960,14 +959,14 @@ def test_of_two_stops_the_more_rows_stay(tmp_path):
             return rows.attrs["t_reached"]
 
     write_case(tmp_path, text)
-    first = stop(1.0)
+    first = stop(0.2)
     before = (tmp_path / "case.h5.stopped").read_bytes()
     assert stop(0.0) == first and (tmp_path / "case.h5.stopped").read_bytes() == before
-    assert stop(2.0) > first
+    assert stop(1.0) > first
     assert files(tmp_path) == ["case.h5.stopped", "case.nml"]
     longest = (tmp_path / "case.h5.stopped").read_bytes()
     write_case(tmp_path, text.replace("1500", "1501"))
-    assert stop(1.0, "case.h5.stopped-1") <= stop(2.0, "case.h5.stopped-1")
+    assert stop(0.2, "case.h5.stopped-1") <= stop(1.0, "case.h5.stopped-1")
     assert files(tmp_path) == ["case.h5.stopped", "case.h5.stopped-1", "case.nml"]
     assert (tmp_path / "case.h5.stopped").read_bytes() == longest
 
@@ -1001,10 +1000,8 @@ def test_a_run_can_be_looked_at_while_it_grows(tmp_path):
         while len(sizes) < 3 and time.monotonic() < end:
             time.sleep(0.05)
             try:
-                with xarray.open_dataset(path) as run:
-                    run.load()
+                run = result_files.read(path)  # xarray leaves a file open that is being written, and HDF5 then never looks at it again
             except (OSError, KeyError, RuntimeError):  # not there yet, or being written just now
-                gc.collect()  # h5netcdf leaves such a file open, and HDF5 then never looks at the file again
                 continue
             if not (np.all(np.isfinite(run.phi)) and np.all(np.diff(run.time) > 0)):
                 continue  # likewise: its last rows are not there yet
@@ -1014,6 +1011,7 @@ def test_a_run_can_be_looked_at_while_it_grows(tmp_path):
     assert len(sizes) == 3, sizes
     with xarray.open_dataset(path) as run:
         assert run.sizes["time"] == sizes[-1] and np.all(np.isfinite(run.load().energy_residual))
+        assert run.attrs["status"] == "running"
     drawn = subprocess.run([sys.executable, ROOT / "postproc" / "histories.py", path, "-q", "omega", "-o", tmp_path / "omega.png"],
                            capture_output=True, text=True)
     assert drawn.returncode == 0, drawn.stderr

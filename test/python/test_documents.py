@@ -5,61 +5,24 @@ import html.parser
 import os
 import pathlib
 import re
-import runpy
 import shutil
 import subprocess
 import sys
-import tempfile
-import traceback
 
 import figures
 import h5py
-import matplotlib.pyplot  # noqa: F401  (for `answer`)
 import numpy as np
 import pytest
 import report
 import result_files
 import tables
 from rodyn_data import DataError
+from scripts import POSTPROC, answer, script
 
-POSTPROC = result_files.ROOT / "postproc"
 RUN_SCRIPTS = ["histories", "shape", "animate", "phase", "ledger", "spectrum", "figures", "report"]
 SWEEP_SCRIPTS = ["sweep_lines", "exact_lumped", "heat_map", "convergence"]
+BROWSED = ["n1", "inertia_failed"]
 BROWSER = os.environ.get("RODYN_BROWSER") or shutil.which("chromium") or shutil.which("chromium-browser")
-
-
-def script(name, *arguments):
-    program = [sys.executable, str(POSTPROC / f"{name}.py"), *map(str, arguments)]
-    return subprocess.run(program, capture_output=True, text=True)
-
-
-def answer(name, *arguments):
-    """The same by a child of this process, which has loaded matplotlib already; to load it takes longer than most answers."""
-    with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as err:
-        child = os.fork()
-        if not child:
-            become_script(str(POSTPROC / f"{name}.py"), [str(argument) for argument in arguments], out, err)
-        status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-        out.seek(0)
-        err.seek(0)
-        return subprocess.CompletedProcess(name, status, out.read(), err.read())
-
-
-def become_script(path, arguments, out, err):
-    """Run a script in this process and end it."""
-    status = 1
-    try:
-        sys.argv, sys.stdout, sys.stderr = [path, *arguments], out, err
-        runpy.run_path(path, run_name="__main__")
-        status = 0
-    except SystemExit as end:
-        status = end.code or 0
-    except BaseException:
-        traceback.print_exc()
-    finally:
-        out.flush()
-        err.flush()
-        os._exit(status)
 
 
 @pytest.fixture(scope="module")
@@ -132,13 +95,13 @@ class Page(html.parser.HTMLParser):
 
 @pytest.fixture(scope="module")
 def reports(runs, sweeps, tmp_path_factory, request):
-    """Reports by the name of a run or a sweep, each made once; "n1" with an animation."""
+    """Reports by the name of a run or a sweep, each made once; "n1" with an animation. Those that a browser opens have all pictures."""
     place = tmp_path_factory.mktemp("reports")
 
     @functools.cache
     def made(name):
         with pytest.MonkeyPatch.context() as patch:
-            if name in runs and name != "n1" and not request.config.getoption("--all"):  # the pictures themselves are tested elsewhere
+            if name not in BROWSED and not request.config.getoption("--all"):  # the pictures themselves are tested elsewhere
                 patch.setattr(report, "pictures", lambda file: figures.pictures(file)[:1])
             patch.setattr(report.animate, "plot", functools.partial(report.animate.plot, seconds=0.5))
             (path,) = report.plot((runs | sweeps)[name], place / f"{name}.html", animation=name == "n1")
@@ -172,7 +135,7 @@ def test_a_report_of_a_sweep_lists_its_failures(reports, name):
     assert page.addresses or name == "all_failed"
 
 
-@pytest.mark.parametrize("name", ["n1", "inertia_failed"])
+@pytest.mark.parametrize("name", BROWSED)
 def test_a_report_opens_in_a_browser(reports, tmp_path, name):
     assert BROWSER, "no Chromium on the PATH: install one, or name it in RODYN_BROWSER"
     path = reports(name)
@@ -229,12 +192,14 @@ def test_the_directory_of_a_sweep_is_no_run(sweeps, tmp_path):
     ("heat_map", "grid", ["--axes", "mass_ratio", "chain.hinge_stiffness(0)"]),
     ("convergence", "orders", ["--axis", "solver.fixed_step", "-q", "phi(1)", "--reference", "0.25"]),
 ])
-def test_scripts_print_the_paths_they_wrote(runs, sweeps, tmp_path, name, kind, options):
-    out = tmp_path / ("x.gif" if name == "animate" else "x")
-    result = script(name, (runs | sweeps)[kind], "--out", out, *options)
+def test_scripts_print_the_paths_they_wrote(runs, sweeps, tmp_path, request, name, kind, options):
+    both = name in ("histories", "sweep_lines", "heat_map") or (name != "animate" and request.config.getoption("--all"))
+    names = ["x.pdf", "x.png"] if both else ["x.gif" if name == "animate" else "x.png"]
+    command = script if name in ("histories", "sweep_lines") else answer
+    result = command(name, (runs | sweeps)[kind], "--out", tmp_path / ("x" if both else names[0]), *options)
     assert result.returncode == 0, result.stderr
     paths = [pathlib.Path(line) for line in result.stdout.splitlines()]
-    assert [p.name for p in paths] == (["x.gif"] if name == "animate" else ["x.pdf", "x.png"])
+    assert [p.name for p in paths] == names
     assert all(p.stat().st_size > 1000 for p in paths)
 
 

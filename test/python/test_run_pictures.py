@@ -28,25 +28,30 @@ def line_data(axes, label=None):
     return [np.asarray(line.get_xydata()) for line in axes.lines if label is None or line.get_label() == label]
 
 
-DRAWN_QUICKLY = ["n4", "n40", "failed", "no_ledger"]  # one of each set of pictures
+DRAWN_QUICKLY = ["n4", "n40"]  # a free and a fixed spacecraft; and "failed" below
 
 
 @pytest.mark.parametrize("name", [
     pytest.param(name, marks=[] if name in DRAWN_QUICKLY else pytest.mark.long) for name in result_files.SCENES
 ])
-def test_every_picture_of_every_scene_is_drawn(runs, tmp_path, monkeypatch, name):
-    formats = style.FORMATS if name == "n4" else (".png",)
+def test_every_picture_of_every_scene_is_drawn(runs, tmp_path, monkeypatch, request, name):
+    formats = style.FORMATS if request.config.getoption("--all") else (".png",)  # `tools/run` of tools/test draws both
     monkeypatch.setattr(style, "FORMATS", formats)
     paths = figures.plot(runs[name], tmp_path / name)
     assert all(path.stat().st_size > 1000 for path in paths)
     assert {path.suffix for path in paths} == set(formats)
-    names = {path.stem.removeprefix(f"{name}-") for path in paths}
+    assert [path.stem for path in paths[::len(formats)]] == [f"{name}-{picture.name}" for picture in figures.pictures(runs[name])]
+
+
+@pytest.mark.parametrize("name", result_files.SCENES)
+def test_a_run_has_the_pictures_that_it_has_data_for(runs, name):
+    names = {picture.name for picture in figures.pictures(runs[name])}
     assert {"chain", "shape", "phase"} <= names
     assert ("ledger" in names) == (name != "no_ledger")
     assert ("histories" in names) == (name != "n40")
 
 
-@pytest.mark.parametrize("name", ["n1", "n4", "rigid", "lumped", "failed"])
+@pytest.mark.parametrize("name", ["n1", "rigid", *(pytest.param(name, marks=pytest.mark.long) for name in ("n4", "lumped", "failed"))])
 def test_histories_show_the_motion_of_the_spacecraft(runs, tmp_path, name):
     figure = histories.plot(runs[name], tmp_path / "x.png")
     with h5py.File(runs[name]) as file:
@@ -73,10 +78,10 @@ def test_a_common_factor_of_an_axis_stands_with_its_unit(runs, tmp_path):
 
 
 def test_a_failed_run_says_so_in_its_titles(runs, tmp_path):
-    for script in (histories, shape, phase, ledger):
-        figure = script.plot(runs["failed"], tmp_path / "x.png")
+    for picture in figures.pictures(runs["failed"]):
+        figure = picture.plot(tmp_path / "x.png")
         title = (figure.get_suptitle() or figure.axes[0].get_title(loc="left"))
-        assert "(failed at t = " in title, script
+        assert "(failed at t = " in title, picture.name
 
 
 def test_named_quantities_share_a_panel_with_their_unit(runs, tmp_path):
@@ -283,9 +288,9 @@ def test_a_run_file_of_100_megabytes_is_plotted_in_ten_seconds(runs, tmp_path_fa
     if not path.exists():
         result_files.write_large_run(path, runs["n4"], 100)
     assert path.stat().st_size > 100_000_000
-    start = clock.perf_counter()
+    start = clock.process_time()  # others may work beside this test
     figure = script.plot(path, directory / script.__name__)
-    assert clock.perf_counter() - start < 10.0
+    assert clock.process_time() - start < 10.0
     if script is histories:
         for axes in figure.axes:
             for line in line_data(axes):

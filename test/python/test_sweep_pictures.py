@@ -30,8 +30,8 @@ def crosses(axes):
 
 
 @pytest.mark.parametrize(("name", "expected"), [
-    ("inertia", {"lines", "exact-lumped"}), ("inertia_failed", {"lines", "exact-lumped"}), ("grid", {"lines", "map"}),
-    ("orders", {"lines", "map", "convergence"}),
+    pytest.param("inertia", {"lines", "exact-lumped"}, marks=pytest.mark.long), ("inertia_failed", {"lines", "exact-lumped"}),
+    ("grid", {"lines", "map"}), ("orders", {"lines", "map", "convergence"}),
 ])
 def test_every_picture_of_every_sweep_is_drawn(sweeps, tmp_path, monkeypatch, name, expected):
     monkeypatch.setattr(style, "FORMATS", (".png",))
