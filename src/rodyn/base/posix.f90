@@ -257,14 +257,8 @@ contains
       integer :: slash
 
       slash = index(path, '/', back=.true.)
-      select case (slash)
-      case (0)
-         directory = '.'
-      case (1)
-         directory = '/'
-      case default
-         directory = path(:slash - 1)
-      end select
+      directory = '.'
+      if (slash > 0) directory = path(:max(1, slash - 1))
    end function parent_directory
 
    !> Have the system put a file's data, or a directory's names, onto the disk.

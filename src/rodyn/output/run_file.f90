@@ -14,6 +14,7 @@ module rodyn_run_file
    use rodyn_build_info, only: git_commit
    use rodyn_errors, only: error_type, raise
    use rodyn_hdf5_files, only: hdf5_file
+   use rodyn_integrator, only: solver_statistics
    use rodyn_kinds, only: i8, wp
    use rodyn_methods, only: solver_options
    use rodyn_posix, only: path_exists, remove_file
@@ -49,18 +50,11 @@ module rodyn_run_file
    end type run_header
 
    !> What the integrator did; the attributes of the group `solver`.
-   type :: solver_report
+   type, extends(solver_statistics) :: solver_report
       character(len=:), allocatable :: method     !! those used
       character(len=:), allocatable :: reason     !! why it was chosen
       character(len=:), allocatable :: kernel     !! 'recursive' or 'assembled'
       type(solver_options) :: options             !! of the case
-      real(wp) :: last_step = 0.0_wp              !! [s]
-      integer(i8) :: n_steps = 0_i8
-      integer(i8) :: n_rhs = 0_i8                 !! right-hand-side evaluations
-      integer(i8) :: n_jac = 0_i8                 !! Jacobians
-      integer(i8) :: n_nonlinear_failures = 0_i8
-      integer(i8) :: n_error_test_failures = 0_i8
-      integer(i8) :: n_restarts = 0_i8            !! at switches of loads
       real(wp) :: work_external_error = 0.0_wp     !! estimated, at the end of the run [J]; with the ledger
       real(wp) :: energy_dissipated_error = 0.0_wp !! likewise [J]
       real(wp) :: wall_seconds = 0.0_wp
@@ -370,7 +364,7 @@ contains
       call self%file%put_attribute(solver_group, 'n_jac', report%n_jac)
       call self%file%put_attribute(solver_group, 'n_nonlinear_failures', report%n_nonlinear_failures)
       call self%file%put_attribute(solver_group, 'n_error_test_failures', report%n_error_test_failures)
-      call self%file%put_attribute(solver_group, 'n_restarts', report%n_restarts)
+      call self%file%put_attribute(solver_group, 'n_restarts', max(0_i8, report%n_starts - 1_i8))
       if (self%layout%before('work_external') >= 0) then
          call self%file%put_attribute(solver_group, 'work_external_error', report%work_external_error)
          call self%file%put_attribute(solver_group, 'energy_dissipated_error', report%energy_dissipated_error)

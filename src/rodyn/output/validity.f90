@@ -12,7 +12,7 @@ module rodyn_validity
    use rodyn_kinds, only: wp
    use rodyn_quantities, only: row_layout, row_type
    use rodyn_scene, only: scene_type
-   use rodyn_text, only: to_text, time_text
+   use rodyn_text, only: joined, time_text, to_text
    implicit none (type, external)
    private
    public :: validity_type, new_validity, greatest_deflection
@@ -138,8 +138,7 @@ contains
       if (self%rods(k)%deflection > self%deflection_limit) text = deflection_warning(self, k)
       k = maxloc(vibration(self%rods, self%n_seen), dim=1)
       if (.not. vibration(self%rods(k), self%n_seen) > frequency_share) return
-      if (len(text) > 0) text = text//new_line('a')
-      text = text//vibration_warning(self, k)
+      text = joined(text, vibration_warning(self, k), new_line('a'))
    end function warnings
 
    !> Bent too far: how far, where, when, and what it means.

@@ -1,7 +1,7 @@
 !> A few lines on what a scene uses and what it skips, for the terminal.
 module rodyn_description
    use rodyn_kinds, only: wp
-   use rodyn_text, only: time_text
+   use rodyn_text, only: joined, time_text, to_text
    use rodyn_scene, only: scene_type
    use rodyn_switch_times, only: same_time
    implicit none (type, external)
@@ -41,11 +41,9 @@ contains
          logical, intent(in) :: used
          character(len=*), intent(in) :: name
          if (used) then
-            if (len(uses) > 0) uses = uses//', '
-            uses = uses//name
+            uses = joined(uses, name, ', ')
          else
-            if (len(skips) > 0) skips = skips//', '
-            skips = skips//name
+            skips = joined(skips, name, ', ')
          end if
       end subroutine note
 
@@ -75,9 +73,7 @@ contains
       integer, intent(in) :: number
       character(len=*), intent(in) :: noun
       character(len=:), allocatable :: text
-      character(len=12) :: digits
-      write (digits, '(i0)') number
-      text = trim(digits)//' '//noun
+      text = to_text(number)//' '//noun
       if (number /= 1) text = text//'s'
    end function count_text
 

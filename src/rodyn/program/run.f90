@@ -218,21 +218,13 @@ contains
       type(error_type), allocatable, intent(in) :: failure
       real(wp), intent(in) :: seconds
       type(error_type), allocatable, intent(out) :: error
-      type(solver_statistics) :: stats
       type(solver_report) :: report
 
-      stats = driver%statistics()
+      report%solver_statistics = driver%statistics()
       report%method = driver%methods()
       report%reason = driver%reason()
       report%kernel = trim(merge('assembled', 'recursive', motion%dynamics%scene%assembled))
       report%options = config%solver%solver_options
-      report%last_step = stats%last_step
-      report%n_steps = stats%n_steps
-      report%n_rhs = stats%n_rhs
-      report%n_jac = stats%n_jac
-      report%n_nonlinear_failures = stats%n_nonlinear_failures
-      report%n_error_test_failures = stats%n_error_test_failures
-      report%n_restarts = max(0_i8, stats%n_starts - 1_i8)
       if (motion%ledger) then
          report%work_external_error = motion%quadrature_error(1)
          report%energy_dissipated_error = motion%quadrature_error(2)
