@@ -57,7 +57,8 @@ module rodyn_lanes_bench
    end type nobody
 
    integer, parameter :: chain_sizes(*) = [4, 16, 64]
-   character(len=*), parameter :: kinds(*) = [character(len=24) :: 'dynamic', 'rigid', 'rigid, lumped', 'quasistatic, lumped']
+   character(len=*), parameter :: kinds(*) = [character(len=24) :: 'dynamic', 'rigid', 'rigid, lumped', 'quasistatic, lumped', &
+      'quasistatic']
 
 contains
 

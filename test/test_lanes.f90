@@ -11,7 +11,7 @@ module test_lanes
    use rodyn_lane_scene, only: lane_scene, new_lane_scene, put_scene, suits_lanes, are_alike
    use rodyn_lane_accelerations, only: lane_work, new_lane_work, group_accelerations
    use test_testing, only: unittest, new_test
-   use test_random_scenes, only: random_case, seed_random, kind_name, n_kinds, uniform
+   use test_random_scenes, only: random_case, seed_random, kind_name, n_all_kinds, uniform
    implicit none (type, external)
    private
    public :: collect_lanes
@@ -123,15 +123,15 @@ contains
    subroutine test_agreement(error)
       type(error_type), allocatable, intent(out) :: error
       type(octet) :: eight
-      real(wp) :: worst(n_kinds), difference
-      integer :: scenes(n_kinds), which, i, lane
+      real(wp) :: worst(n_all_kinds), difference
+      integer :: scenes(n_all_kinds), which, i, lane
       logical :: found
       character(len=100) :: text
 
       call seed_random(2)
       worst = 0.0_wp
       scenes = 0
-      do which = 1, n_kinds
+      do which = 1, n_all_kinds
          if (index(kind_name(which), 'bubbles') > 0) cycle ! have no lanes
          do i = 1, 125
             call random_octet(eight, which, 1 + mod(i, 9), found, error)
@@ -165,7 +165,7 @@ contains
       logical :: ok
 
       call seed_random(3)
-      do which = 1, n_kinds
+      do which = 1, n_all_kinds
          do i = 1, 2
             call random_case(config, which, 4)
             config%chain%hinge_damping = 0.0_wp ! no hinge with a state of its own
@@ -249,7 +249,7 @@ contains
       call ieee_set_halting_mode(ieee_usual, .false.)
       poison = [ieee_value(0.0_wp, ieee_quiet_nan), 1.0e300_wp, -7.0e5_wp, 0.0_wp]
       call seed_random(5)
-      kinds: do which = 1, n_kinds
+      kinds: do which = 1, n_all_kinds
          call random_octet(eight, which, 5, found, error)
          if (allocated(error)) exit kinds
          if (.not. found) cycle kinds
@@ -284,7 +284,7 @@ contains
       logical :: found
 
       call seed_random(6)
-      do which = 1, n_kinds
+      do which = 1, n_all_kinds
          do n = 1, 6
             call random_octet(eight, which, n, found, error)
             if (allocated(error)) return

@@ -3,7 +3,8 @@ module rodyn_lane_accelerations
    use rodyn_kinds, only: wp
    use rodyn_lanes, only: lanes
    use rodyn_lane_scene, only: lane_scene
-   use rodyn_lane_hinges, only: lane_rigid_moments, lane_series_moments
+   use rodyn_lane_hinges, only: lane_rigid_moments, lane_series_moments, lane_condensed_moments
+   use rodyn_lane_recursion_condensed, only: lane_condensed_accelerations
    use rodyn_lane_recursion_flexible, only: lane_flexible_accelerations
    use rodyn_lane_recursion_rigid, only: lane_rigid_accelerations
    use rodyn_outboard_chain, only: lane_outward_size
@@ -17,6 +18,7 @@ module rodyn_lane_accelerations
       real(wp), allocatable :: sine(:, :), cosine(:, :) !! of phi (lanes, 0:n); 0 and 1 at k = 0
       real(wp), allocatable :: outward(:, :, :)         !! between the passes (lanes, lane_outward_size, n)
       real(wp), allocatable :: theta(:, :), moment(:, :) !! joint rotations (lanes, 0:n-1), hinge moments (lanes, 0:n)
+      real(wp), allocatable, dimension(:, :) :: moment_rate, force !! of condensed rods (lanes, 0:n)
    end type lane_work
 
 contains
@@ -27,6 +29,7 @@ contains
       associate (n => group%n)
          allocate (work%sine(lanes, 0:n), work%cosine(lanes, 0:n), work%outward(lanes, lane_outward_size, n), &
                    work%theta(lanes, 0:n - 1), work%moment(lanes, 0:n), source=0.0_wp)
+         if (allocated(group%condensed)) allocate (work%moment_rate(lanes, 0:n), work%force(lanes, 0:n), source=0.0_wp)
       end associate
       work%cosine(:, 0) = 1.0_wp
    end subroutine new_lane_work
@@ -47,6 +50,15 @@ contains
                                              group%base_force, group%loaded, group%node_force, work%sine, work%cosine, &
                                              q(:, b + 1:b + n), q(:, b + n + 1:b + 2*n), q(:, b + 2*n + 1:b + 3*n), p, &
                                              work%outward, acceleration, ok)
+            return
+         end if
+         if (allocated(group%condensed)) then
+            call lane_condensed_moments(n, group%stiffness, group%damping, group%kink, group%lower, group%pivot, group%upper, &
+                                        q(:, b + 1:b + n), p(:, b + 1:b + n), work%moment, work%moment_rate, work%force)
+            call lane_condensed_accelerations(n, b, group%condensed, group%node_mass, group%mass, group%inertia, group%hinge_x, &
+                                              group%hinge_y, group%base_force, group%loaded, group%node_force, work%sine, &
+                                              work%cosine, work%moment, work%moment_rate, work%force, p, work%outward, &
+                                              acceleration, ok)
             return
          end if
          if (group%series) then

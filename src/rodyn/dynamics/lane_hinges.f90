@@ -5,7 +5,7 @@ module rodyn_lane_hinges
    use rodyn_lanes, only: lanes
    implicit none (type, external)
    private
-   public :: lane_rigid_moments, lane_series_moments
+   public :: lane_rigid_moments, lane_series_moments, lane_condensed_moments
 
 contains
 
@@ -64,6 +64,40 @@ contains
          end do
       end do
    end subroutine lane_series_moments
+
+   !> Condensed rods (`bend_chain` of `rodyn_recursion_condensed`): moments of the springs, their rates, and the forces on th_k.
+   pure subroutine lane_condensed_moments(n, stiffness, damping, kink, lower, pivot, upper, phi, phi_rate, moment, moment_rate, &
+                                          force)
+      integer, intent(in) :: n !! rods
+      real(wp), dimension(lanes, 0:n - 1), intent(in) :: stiffness, damping, kink !! C, D, gamma
+      real(wp), dimension(lanes, 0:n - 1), intent(in) :: lower, pivot, upper !! as for `lane_series_moments`
+      real(wp), dimension(lanes, n), intent(in) :: phi, phi_rate !! [rad], [rad/s]
+      real(wp), dimension(lanes, 0:n), intent(out) :: moment, moment_rate, force !! zero at n
+      integer :: k, i
+
+      call openings(n, phi, moment)
+      call openings(n, phi_rate, moment_rate)
+      do k = 0, n - 1
+         !$omp simd
+         do i = 1, lanes
+            moment(i, k) = moment(i, k) - kink(i, k)
+            force(i, k) = stiffness(i, k)*moment(i, k)
+         end do
+      end do
+      call solve(n, lower, pivot, upper, moment)
+      call solve(n, lower, pivot, upper, moment_rate)
+      do k = 0, n - 1
+         !$omp simd
+         do i = 1, lanes
+            force(i, k) = force(i, k) + damping(i, k)*moment_rate(i, k)
+            moment(i, k) = stiffness(i, k)*moment(i, k)
+            moment_rate(i, k) = stiffness(i, k)*moment_rate(i, k)
+         end do
+      end do
+      moment(:, n) = 0.0_wp
+      moment_rate(:, n) = 0.0_wp
+      force(:, n) = 0.0_wp
+   end subroutine lane_condensed_moments
 
    !> Opening of each hinge, without its kink.
    pure subroutine openings(n, angle, opening)

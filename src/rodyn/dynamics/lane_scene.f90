@@ -9,9 +9,10 @@ module rodyn_lane_scene
    use rodyn_rod_constants, only: rod_constants
    use rodyn_scene, only: scene_type
    use rodyn_hinge_law, only: hinge_law
+   use rodyn_recursion_condensed, only: condensed_rod, prepare_rod
    implicit none (type, external)
    private
-   public :: lane_rod, lane_scene, new_lane_scene, put_scene, suits_lanes, are_alike
+   public :: lane_rod, lane_condensed_rod, lane_scene, new_lane_scene, put_scene, suits_lanes, are_alike
 
    !> What the recursion reads of a rod (`rodyn_rod_constants`).
    type :: lane_rod
@@ -20,6 +21,13 @@ module rodyn_lane_scene
       real(wp), dimension(lanes, 2) :: carry_over, g, h
       real(wp), dimension(lanes, 3) :: stiffness, second, b_inverse
    end type lane_rod
+
+   !> The same of condensed rods, each between its hinges (`rodyn_recursion_condensed`).
+   type :: lane_condensed_rod
+      real(wp), dimension(lanes) :: length, m0, m1, turn_y, turn_z, out_y, out_z, across_y, across_z, tt, ty, tz, yy, yz, zz
+      real(wp), dimension(lanes, 2) :: first, bend_y, bend_z
+      real(wp), dimension(lanes, 3) :: flexibility, inertia, second
+   end type lane_condensed_rod
 
    !> A group of scenes.
    type :: lane_scene
@@ -30,6 +38,7 @@ module rodyn_lane_scene
       logical :: series = .false.        !! they follow from the hinge moments
       logical :: damped = .false.        !! some hinge has a damper, if `series`; otherwise not used
       logical :: loaded = .false.        !! some force acts on a node in some lane
+      type(lane_condensed_rod), allocatable :: condensed(:) !! condensed rods (n); allocated if they are
       type(lane_rod), allocatable :: rods(:) !! distinct rods
       integer, allocatable :: rod_of(:)      !! which of them is rod k (n)
       real(wp), allocatable :: node_mass(:, :) !! mu (lanes, 0:n) [kg]
@@ -50,7 +59,7 @@ contains
       type(scene_type), intent(in) :: scene
       type(hinge_law), intent(in) :: hinges !! as they are now
       suits_lanes = .not. scene%assembled .and. size(hinges%relaxing) == 0 .and. .not. hinges%has_locks .and. &
-                    .not. hinges%curved .and. scene%n_bend < 3 .and. .not. scene%condensed
+                    .not. hinges%curved .and. scene%n_bend < 3
       if (scene%quasistatic) suits_lanes = suits_lanes .and. .not. hinges%driven .and. size(hinges%mechanisms) == 0
    end function suits_lanes
 
@@ -59,13 +68,14 @@ contains
    pure logical function are_alike(a, b)
       type(scene_type), intent(in) :: a, b
       are_alike = a%n == b%n .and. a%n_base == b%n_base .and. (a%dynamic_bending .eqv. b%dynamic_bending) .and. &
-                  (a%quasistatic .eqv. b%quasistatic) .and. (has_series_dampers(a) .eqv. has_series_dampers(b)) .and. &
+                  (a%quasistatic .eqv. b%quasistatic) .and. (a%condensed .eqv. b%condensed) .and. &
+                  (has_series_dampers(a) .eqv. has_series_dampers(b)) .and. &
                   (any(a%loads%loads%node > 0) .eqv. any(b%loads%loads%node > 0))
    end function are_alike
 
    pure logical function has_series_dampers(scene)
       type(scene_type), intent(in) :: scene
-      has_series_dampers = scene%quasistatic .and. scene%hinges%has_damping
+      has_series_dampers = scene%quasistatic .and. scene%hinges%has_damping .and. .not. scene%condensed
    end function has_series_dampers
 
    !> A group with the same scene in every lane.
@@ -96,6 +106,7 @@ contains
                    source=0.0_wp)
          if (group%series) allocate (group%lower(lanes, 0:n - 1), group%pivot(lanes, 0:n - 1), group%upper(lanes, 0:n - 1), &
                                      source=0.0_wp)
+         if (scene%condensed) allocate (group%condensed(n))
       end associate
       do i = 1, lanes
          call put_scene(group, i, scene, hinges)
@@ -108,6 +119,7 @@ contains
       integer, intent(in) :: lane
       type(scene_type), intent(in) :: scene
       type(hinge_law), intent(in) :: hinges
+      type(condensed_rod) :: condensed
       integer :: k
 
       do k = 1, scene%n
@@ -130,6 +142,11 @@ contains
          group%pivot(lane, :) = series%pivot
          group%upper(lane, 0:n - 2) = series%upper
       end associate
+      if (.not. scene%condensed) return
+      do k = 1, scene%n
+         call prepare_rod(scene, hinges%locked, hinges%stiffness, k, condensed)
+         call put_condensed_rod(group%condensed(k), lane, condensed)
+      end do
    end subroutine put_scene
 
    pure subroutine put_rod(rods, lane, rod)
@@ -159,5 +176,33 @@ contains
       rods%second(lane, :) = rod%second
       rods%b_inverse(lane, :) = rod%b_inverse
    end subroutine put_rod
+
+   pure subroutine put_condensed_rod(rods, lane, rod)
+      type(lane_condensed_rod), intent(inout) :: rods
+      integer, intent(in) :: lane
+      type(condensed_rod), intent(in) :: rod
+
+      rods%length(lane) = rod%length
+      rods%m0(lane) = rod%m0
+      rods%m1(lane) = rod%m1
+      rods%turn_y(lane) = rod%turn_y
+      rods%turn_z(lane) = rod%turn_z
+      rods%out_y(lane) = rod%out_y
+      rods%out_z(lane) = rod%out_z
+      rods%across_y(lane) = rod%across_y
+      rods%across_z(lane) = rod%across_z
+      rods%tt(lane) = rod%tt
+      rods%ty(lane) = rod%ty
+      rods%tz(lane) = rod%tz
+      rods%yy(lane) = rod%yy
+      rods%yz(lane) = rod%yz
+      rods%zz(lane) = rod%zz
+      rods%first(lane, :) = rod%first
+      rods%bend_y(lane, :) = rod%bend_y
+      rods%bend_z(lane, :) = rod%bend_z
+      rods%flexibility(lane, :) = rod%flexibility
+      rods%inertia(lane, :) = rod%inertia
+      rods%second(lane, :) = rod%second
+   end subroutine put_condensed_rod
 
 end module rodyn_lane_scene

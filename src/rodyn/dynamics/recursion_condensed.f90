@@ -9,7 +9,7 @@
 !>     (f, moment, force on x_k) = P (A, t_out, x_k) + b.
 !> From the tip inward rod k is added in (A, t, y, z), and z eliminated: one division a rod. In these unknowns springs are local,
 !> too: the force on th_k is C (opening - gamma) + t0 + D th' + f, on a locked m_k opening - gamma - th.
-!> The same equations elsewhere: docs/model.md sec. 7.
+!> In vector lanes: `rodyn_lane_recursion_condensed`. The same equations elsewhere: docs/model.md sec. 7.
 module rodyn_recursion_condensed
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp
