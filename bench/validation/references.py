@@ -45,6 +45,23 @@ def blade(spin: float, radius: float) -> float:
     return frequencies(mass, shapes.integral(2) + shapes.integral(1, tension) - spin**2 * mass)[0]
 
 
+def blade_elements(spin: float, radius: float, n: int) -> float:
+    """The same by n Hermite elements with geometric stiffness: what rods that keep their arc are in small vibration."""
+    mass, stiffness = np.zeros((2, 2 * n + 2, 2 * n + 2))
+    one, h = np.ones_like(X), 1.0 / n
+    value = np.array([1 - 3 * X**2 + 2 * X**3, h * (X - 2 * X**2 + X**3), 3 * X**2 - 2 * X**3, h * (X**3 - X**2)])
+    slope = np.array([6 * X**2 - 6 * X, h * (1 - 4 * X + 3 * X**2), 6 * X - 6 * X**2, h * (3 * X**2 - 2 * X)]) / h
+    curvature = np.array([12 * X - 6 * one, h * (6 * X - 4 * one), 6 * one - 12 * X, h * (6 * X - 2 * one)]) / h**2
+    for k in range(n):
+        x = (k + X) * h
+        tension = spin**2 * (radius * (1.0 - x) + 0.5 * (1.0 - x**2))
+        own = np.s_[2 * k:2 * k + 4, 2 * k:2 * k + 4]
+        inertia = (WEIGHTS * h * value) @ value.T
+        mass[own] += inertia
+        stiffness[own] += (WEIGHTS * h * curvature) @ curvature.T + (WEIGHTS * h * tension * slope) @ slope.T - spin**2 * inertia
+    return frequencies(mass[2:, 2:], stiffness[2:, 2:])[0]
+
+
 def cantilever(tip_mass: float = 0.0, root_spring: float | None = None) -> np.ndarray:
     """Frequencies of a beam, clamped or hinged with a spring, with a mass on its tip."""
     shapes = Shapes(2 if root_spring is None else 1)
