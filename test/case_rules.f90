@@ -94,7 +94,7 @@ contains
    subroutine condensed_exact(error)
       type(error_type), allocatable, intent(out) :: error
       call expect_faults(error, &
-         valid//'&model bending = ''quasistatic'', dampers = ''exact'' /', &
+         valid//'&model formulation = ''consistent'', bending = ''quasistatic'', dampers = ''exact'' /', &
          'c.nml:3: &model dampers = ''exact'': ''exact'' is not possible with bending = ''quasistatic'' and '//&
          'inertia = ''distributed''; take ''reduced'', or inertia = ''lumped''')
    end subroutine condensed_exact
@@ -102,7 +102,7 @@ contains
    subroutine condensed_changes(error)
       type(error_type), allocatable, intent(out) :: error
       call expect_faults(error, &
-         valid//'&model bending = ''quasistatic'' /'//new_line('a')//&
+         valid//'&model formulation = ''consistent'', bending = ''quasistatic'' /'//new_line('a')//&
          '&hinge hinge = 0, upper_stop = 1, stop_stiffness = 9 / &kink_program hinge = 0, law = ''sine'', value = 1, rate = 1 /', &
          'c.nml:4: &hinge upper_stop = 1: is not possible with bending = ''quasistatic'' and inertia = ''distributed'''//&
          new_line('a')//'c.nml:4: &kink_program law = ''sine'': must be ''smooth_step'' or ''table'' with bending = '//&

@@ -56,6 +56,7 @@ contains
       integer, intent(in) :: which
       if (which > n_kinds) then
          config%spacecraft%motion = merge('free ', 'fixed', which == n_kinds + 1)
+         config%model%formulation = 'consistent'
          config%model%bending = 'quasistatic'
          return
       end if

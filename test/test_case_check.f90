@@ -50,7 +50,8 @@ contains
          text = "&model inertia = 'lumped' /"
          config%model%inertia = 'lumped'
       case (4)
-         text = "&model bending = 'quasistatic', dampers = 'exact' /"
+         text = "&model formulation = 'consistent', bending = 'quasistatic', dampers = 'exact' /"
+         config%model%formulation = 'consistent'
          config%model%bending = 'quasistatic'
          config%model%dampers = 'exact'
       case (5)

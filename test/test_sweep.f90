@@ -44,13 +44,18 @@ contains
          new_test('good records of a damaged shard are kept, and no other', good_records_kept)]
    end subroutine collect_sweep
 
-   subroutine new_sweep(text, sweep, plan, error)
+   subroutine new_sweep(text, sweep, plan, error, more)
       character(len=*), intent(in) :: text
       type(sweep_config), intent(out) :: sweep
       type(sweep_plan), intent(out) :: plan
       type(error_type), allocatable, intent(out) :: error
+      character(len=*), intent(in), optional :: more !! of the base
       type(input_texts) :: input
-      call new_input_texts(input, text, 's.nml', base, 'b.nml')
+      if (present(more)) then
+         call new_input_texts(input, text, 's.nml', base//nl//more, 'b.nml')
+      else
+         call new_input_texts(input, text, 's.nml', base, 'b.nml')
+      end if
       call parse_sweep(input, .true., sweep, error)
       if (.not. allocated(error)) call new_plan(plan, sweep, error)
    end subroutine new_sweep
@@ -132,6 +137,11 @@ contains
       if (.not. allocated(error)) call build_case(sweep, plan, 1, config, error)
       if (allocated(error)) return
       call check(error, trim(config%model%inertia)//' '//trim(config%model%bending), 'distributed dynamic', 'case 1')
+      if (.not. allocated(error)) call new_sweep(grid, sweep, plan, error, &
+                                                      "&model formulation = 'consistent', bending = 'quasistatic' /")
+      if (.not. allocated(error)) call build_case(sweep, plan, 1, config, error)
+      if (allocated(error)) return
+      call check(error, trim(config%model%inertia)//' '//trim(config%model%bending), 'distributed quasistatic', 'condensed base')
    end subroutine bending_follows
 
    !> A small result and its shape.

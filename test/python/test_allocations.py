@@ -77,7 +77,7 @@ WAYS = [(scene, kernel) for scene in SCENES for kernel in ("recursive", "assembl
 
 def case(scene: str, motion: str, kernel: str, method: str, t_end: float) -> str:
     bending, inertia, hinges = SCENES[scene]
-    shapes = "bending_shapes = 3, gauss_points = 5," if scene == "three shapes" else ""
+    shapes = {"three shapes": "bending_shapes = 3, gauss_points = 5,", "condensed": "formulation = 'consistent',"}.get(scene, "")
     return f"""&case t_end = {t_end:.2f}, n_outputs = 1 /
 &spacecraft motion = '{motion}', mass = 122.5, inertia = 10, hinge_x = 0.35, hinge_y = 0.35 /
 &chain n_rods = 3, length = 1.5, 1.4, 1.3, mass_per_length = 1.7, bending_stiffness = 1.37e4, node_mass = 0.5,

@@ -28,7 +28,7 @@ contains
       integer :: hinge, i
 
       text = ''
-      if (ledger .and. scene%dynamic_bending .and. .not. scene%consistent) &
+      if (ledger .and. (scene%dynamic_bending .or. scene%condensed) .and. .not. scene%consistent) &
          text = "formulation 'paper' has no exact energy: the energy residual includes the defect of the formulation"
       do i = 1, size(scene%loads%loads)
          associate (law => scene%loads%loads(i)%law)

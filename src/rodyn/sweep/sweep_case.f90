@@ -4,7 +4,7 @@
 module rodyn_sweep_case
    use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    use rodyn_kinds, only: wp, i8
-   use rodyn_case_config, only: case_config
+   use rodyn_case_config, only: case_config, model_config
    use rodyn_case_reader, only: case_from_document
    use rodyn_errors, only: error_type, raise, exit_bad_input, exit_stopped
    use rodyn_driver, only: driver_type, new_driver
@@ -189,7 +189,7 @@ contains
                            axis%in_list)
             if (allocated(error)) return
             if (axis%key /= 'model.inertia' .or. any(sweep%axes%key == 'model.bending')) cycle
-            call follow_inertia(document, trim(sweep%base_case%model%bending), axis%texts(rows(axis%dimension)), error)
+            call follow_inertia(document, sweep%base_case%model, axis%texts(rows(axis%dimension)), error)
             if (allocated(error)) return
          end associate
       end do
@@ -205,16 +205,16 @@ contains
    end function row_of
 
    !> Rods without inertia cannot swing by themselves: where an axis changes the inertia and none the bending,
-   !> 'dynamic' becomes 'quasistatic' for lumped mass, and the reverse for distributed mass.
-   subroutine follow_inertia(document, bending, inertia, error)
+   !> 'dynamic' becomes 'quasistatic' for lumped mass, and the reverse for distributed mass. A base with condensed rods keeps them.
+   subroutine follow_inertia(document, base, inertia, error)
       type(namelist_document), intent(inout) :: document
-      character(len=*), intent(in) :: bending !! of the base
+      type(model_config), intent(in) :: base
       character(len=*), intent(in) :: inertia !! of the case
       type(error_type), allocatable, intent(out) :: error
 
-      if (inertia == 'lumped' .and. bending == 'dynamic') then
+      if (inertia == 'lumped' .and. base%bending == 'dynamic') then
          call set_value(document, 'model.bending', "'quasistatic'", error)
-      else if (inertia == 'distributed' .and. bending == 'quasistatic') then
+      else if (inertia == 'distributed' .and. base%bending == 'quasistatic' .and. base%inertia == 'lumped') then
          call set_value(document, 'model.bending', "'dynamic'", error)
       end if
    end subroutine follow_inertia
