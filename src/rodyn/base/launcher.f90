@@ -41,7 +41,7 @@ contains
       do i = 1, size(counts)
          n = number_in(counts(i))
          if (n <= launch%count) cycle
-         if (is_told_by_script(trim(counts(i)))) cycle
+         if (is_started_by_script(trim(counts(i)))) cycle
          launch%count = n
          launch%rank = number_in(ranks(i))
          launch%variable = trim(counts(i))
@@ -49,7 +49,7 @@ contains
    end function direct_launch
 
    !> Is there a script between the launcher, whose own environment has no such variable, and this process?
-   logical function is_told_by_script(variable) result(script)
+   logical function is_started_by_script(variable) result(script)
       character(len=*), intent(in) :: variable
       character(len=:), allocatable :: environment
       integer :: pid
@@ -65,7 +65,7 @@ contains
       if (script) return
       script = same_path(variable_in(text_of('self', 'environ'), '_'), '/proc/self/exe') ! a shell that became this program
       if (.not. script) script = launcher_names_another(pid)
-   end function is_told_by_script
+   end function is_started_by_script
 
    !> Does a process only run this command line, and in its own directory?
    logical function wraps_this(pid, environment)

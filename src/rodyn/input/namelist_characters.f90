@@ -46,13 +46,13 @@ contains
       type(fault_list), intent(inout) :: faults
       character(len=:), allocatable :: buffer
       character(len=1) :: c, within !! quote of the text that is open; blank: none
-      integer :: told(4)            !! line of the last fault of each kind
+      integer :: reported(4)        !! line of the last fault of each kind
       integer :: at, code, kind, length, line, n
       logical :: comment, foreign   !! in a comment; in a text with quotes that are not plain
 
       if (all_ascii(text)) return
       allocate (character(len=len(text)) :: buffer)
-      told = 0
+      reported = 0
       line = 1
       n = 0
       within = ' '
@@ -68,8 +68,8 @@ contains
          if (within /= ' ' .and. .not. (foreign .and. kind == quote)) kind = 0
          if (kind == 0) length = 1
          if (kind > 0) then
-            if (told(kind) /= line) call faults%add(line, 'character '//code_text(code)//trim(rules(kind)))
-            told(kind) = line
+            if (reported(kind) /= line) call faults%add(line, 'character '//code_text(code)//trim(rules(kind)))
+            reported(kind) = line
             c = plain(kind)
          end if
          if (kind /= invisible) then

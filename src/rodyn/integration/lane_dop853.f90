@@ -196,7 +196,7 @@ contains
       integer, intent(in) :: lane
       real(wp), intent(in) :: t_wanted !! not after t_stop; huge: none in this interval [s]
       self%course(lane)%t_wanted = t_wanted
-      call settle(self, lane)
+      call choose_event(self, lane)
    end subroutine proceed
 
    !> Make a lane idle.
@@ -382,7 +382,7 @@ contains
    end subroutine judge
 
    !> After an event: the next side trip, the end of side trips, or the next event at once.
-   subroutine settle(self, lane)
+   subroutine choose_event(self, lane)
       class(lane_dop853), intent(inout) :: self
       integer, intent(in) :: lane
 
@@ -399,7 +399,7 @@ contains
          if (course%t >= course%t_stop) course%event = at_stop
          if (course%t >= course%t_wanted) course%event = at_output
       end associate
-   end subroutine settle
+   end subroutine choose_event
 
    !> Keep the end of a step before the side trips inside it.
    subroutine keep_end(self, lane)

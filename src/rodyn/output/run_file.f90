@@ -82,7 +82,7 @@ module rodyn_run_file
       procedure :: finish
       procedure :: stop_at
       procedure, private :: check_open
-      procedure, private :: give_up
+      procedure, private :: keep_failure
       procedure, private :: write_layout
       procedure, private :: write_solver_report
       procedure, private :: flush_is_due
@@ -195,12 +195,12 @@ contains
    end subroutine check_open
 
    !> Leave what cannot be written on, and keep in mind why.
-   subroutine give_up(self, error)
+   subroutine keep_failure(self, error)
       class(run_file), intent(inout) :: self
       type(error_type), intent(inout) :: error
       call self%leave(error)
       self%lost = error%message
-   end subroutine give_up
+   end subroutine keep_failure
 
    !> Add one row. It is copied; blocks of rows are written as they fill.
    subroutine append(self, row, error)
@@ -264,7 +264,7 @@ contains
          if (i > 1) call self%file%attach_scale(trim(names(i)), 1, 'events/time')
       end do
       call self%file%get_failure(error)
-      if (allocated(error)) call self%give_up(error)
+      if (allocated(error)) call self%keep_failure(error)
    end subroutine write_events
 
    !> Write what waits, the final attributes, and give the file its final name. A file in which something found no room is
@@ -443,7 +443,7 @@ contains
       end associate
       call self%file%flush(error)
       if (allocated(error)) then
-         call self%give_up(error)
+         call self%keep_failure(error)
          return
       end if
       self%worth_keeping = .true.

@@ -24,7 +24,7 @@ module rodyn_ensemble
       real(wp) :: t = 0.0_wp               !! last good time [s]
       real(wp) :: seconds = 0.0_wp         !! its share of the wall time: that of a pass is divided among the lanes in use [s]
       logical :: late = .false.            !! the limit was exceeded
-      logical :: has_failed = .false.         !! the method did, not for want of steps
+      logical :: has_failed = .false.      !! the method did, not for want of steps
       type(solver_statistics) :: counts
       type(error_type), allocatable :: error !! why it ended early
       real(wp), allocatable, private :: ends(:) !! of the regimes [s]

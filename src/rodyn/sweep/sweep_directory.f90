@@ -65,7 +65,7 @@ contains
       if (allocated(error)) return
       call self%begin_scan()
       call lock_cases(self, shard, n_shards, error)
-      if (.not. allocated(error)) call settle_plan(self, plan, force, error)
+      if (.not. allocated(error)) call compare_plan(self, plan, force, error)
       call self%end_scan()
    end subroutine open_directory
 
@@ -135,7 +135,7 @@ contains
    end subroutine lock_rank
 
    !> Is the plan the one that is there? If none is there, it is written.
-   subroutine settle_plan(self, plan, force, error)
+   subroutine compare_plan(self, plan, force, error)
       class(sweep_directory), intent(inout) :: self
       character(len=*), intent(in) :: plan
       logical, intent(in) :: force
@@ -158,7 +158,7 @@ contains
       end if
       failure = write_text_file(self%path//'/plan.txt', plan)
       if (len(failure) > 0) call raise(error, self%path//'/plan.txt: cannot be written: '//failure)
-   end subroutine settle_plan
+   end subroutine compare_plan
 
    !> Remove what a sweep makes, and nothing else; its result waits for the new one. The plan goes last.
    subroutine remove_all(path, error)

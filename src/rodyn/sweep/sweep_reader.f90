@@ -30,7 +30,7 @@ module rodyn_sweep_reader
    character(len=*), parameter :: nl = new_line('a')
    integer, parameter :: most_tried = 10000 !! rows of a dimension that are built
    integer, parameter :: most_dimensions = 60 !! of a sweep whose rows are built: of more it has too many cases in any event
-   integer, parameter :: most_told = 10     !! values of an axis that are named
+   integer, parameter :: most_named = 10    !! values of an axis that are named
    type(schema_row), parameter :: ratio_row = schema_row('mass_ratio', rule=positive, type=type_real)
    character(len=*), parameter :: heading = &
       '! A sweep of Rodyn: every key, with its default or an example.'//nl// &
@@ -341,13 +341,13 @@ contains
          if (len(rule) == 0) cycle
          axis%bad(k) = .true.
          n_bad = n_bad + 1
-         if (n_bad <= most_told) call report(checked, 'axis', i, key, 'value '//to_text(k)//' ('//told(k)//') '//rule)
+         if (n_bad <= most_named) call report(checked, 'axis', i, key, 'value '//to_text(k)//' ('//shown(k)//') '//rule)
       end do
-      if (n_bad > most_told) call report(checked, 'axis', i, key, 'and '//to_text(n_bad - most_told)//' more of its values')
+      if (n_bad > most_named) call report(checked, 'axis', i, key, 'and '//to_text(n_bad - most_named)//' more of its values')
 
    contains
 
-      function told(k) result(text)
+      function shown(k) result(text)
          integer, intent(in) :: k
          character(len=:), allocatable :: text
          if (axis%whole) then
@@ -355,7 +355,7 @@ contains
          else
             text = shown_value(axis, k)
          end if
-      end function told
+      end function shown
 
    end subroutine check_values
 
@@ -491,7 +491,7 @@ contains
             n_refused = n_refused + 1
             call report(checked, 'axis', faulty_axis(sweep, d, row), 'key', 'value '//to_text(row)//' ('// &
                        shown_value(sweep%axes(faulty_axis(sweep, d, row)), row)//') '//why)
-            if (n_refused < most_told .or. i == min(n, most_tried)) cycle
+            if (n_refused < most_named .or. i == min(n, most_tried)) cycle
             call report(checked, 'axis', faulty_axis(sweep, d, row), 'key', 'further values were not tried')
             exit
          end do

@@ -50,7 +50,7 @@ module rodyn_sweep_writer
       procedure, private :: begin
       procedure, private :: sync
       procedure, private :: wait
-      procedure, private :: tell
+      procedure, private :: raise_failure
    end type shard_writer
 
 contains
@@ -92,14 +92,14 @@ contains
       end if
       if (len(failure) > 0) then
          call self%sync() ! of those before it
-         call self%tell(failure, error)
+         call self%raise_failure(failure, error)
          return
       end if
       call self%extent%add(self%words(:n))
       if (self%clock_waiting == 0) call system_clock(self%clock_waiting)
       if (kept%wall_seconds >= self%wait()) call self%sync()
       if (self%extent%used >= large_enough) call self%seal(error)
-      if (len(self%failure) > 0 .and. .not. allocated(error)) call self%tell(self%failure, error)
+      if (len(self%failure) > 0 .and. .not. allocated(error)) call self%raise_failure(self%failure, error)
    end subroutine add
 
    !> Begin a shard.
@@ -157,7 +157,7 @@ contains
       failure = self%failure
       if (len(failure) == 0) failure = seal_file(self%file, self%name, self%extent)
       if (len(failure) > 0) then
-         call self%tell(failure, error)
+         call self%raise_failure(failure, error)
          return
       end if
       self%clock_waiting = 0
@@ -165,7 +165,7 @@ contains
                          self%extent%n_records, self%extent%total, error)
    end subroutine seal
 
-   subroutine tell(self, failure, error)
+   subroutine raise_failure(self, failure, error)
       class(shard_writer), intent(in) :: self
       character(len=*), intent(in) :: failure
       type(error_type), allocatable, intent(out) :: error
@@ -175,7 +175,7 @@ contains
       else
          call raise(error, self%directory//': was removed, and all results with it')
       end if
-   end subroutine tell
+   end subroutine raise_failure
 
    !> Give an open shard its trailer, unless it has it, and its name. The file is closed then.
    function seal_file(file, name, extent) result(failure)
