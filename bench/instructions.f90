@@ -29,7 +29,7 @@ program bench_instructions
    call get_command_argument(2, times_text)
    read (times_text, *) times
    call prepare()
-   if (kind == 'lanes') then
+   if (kind(1:5) == 'lanes') then
       call evaluate_lanes()
    else if (kind(1:4) == 'run_') then
       n_rhs = 0
@@ -50,7 +50,7 @@ contains
 
       call read_case('cases/table1.nml', config, error=error)
       if (allocated(error)) error stop error%message
-      config%model%formulation = 'consistent'
+      config%model%formulation = merge('inextensible', 'consistent  ', index(kind, 'inextensible') > 0)
       if (kind == 'rhs_rigid' .or. kind == 'rhs_lumped') config%model%bending = 'rigid'
       if (kind == 'rhs_quasistatic' .or. kind == 'rhs_condensed') config%model%bending = 'quasistatic'
       if (kind == 'rhs_lumped' .or. kind == 'rhs_quasistatic') config%model%inertia = 'lumped'

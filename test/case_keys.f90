@@ -159,7 +159,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       call expect_faults(error, &
          valid//'&model formulation = ''papers'' /', &
-         'c.nml:3: &model formulation = ''papers'': must be ''consistent'' or ''paper''')
+         'c.nml:3: &model formulation = ''papers'': must be ''inextensible'', ''consistent'' or ''paper''')
    end subroutine unknown_word
 
    subroutine broken_element(error)

@@ -6,9 +6,9 @@ module test_random_scenes
    private
    public :: random_case, seed_random, uniform, kind_name, n_kinds, n_all_kinds, allocate_case
 
-   integer, parameter :: n_kinds = 18 !! 7 models on a free and on a fixed spacecraft, and 4 with a third bending shape
+   integer, parameter :: n_kinds = 22 !! 7 models on a free and on a fixed spacecraft, 4 with a third bending shape, 4 inextensible
    integer, parameter :: n_all_kinds = n_kinds + 2 !! and condensed rods, which do not take hinges that change their stiffness
-   integer, parameter :: with_two_shapes = 14
+   integer, parameter :: with_two_shapes = 14, with_chords = 18
    integer(i8), parameter :: lehmer_modulus = 2147483647_i8
 
 contains
@@ -58,6 +58,13 @@ contains
          config%spacecraft%motion = merge('free ', 'fixed', which == n_kinds + 1)
          config%model%formulation = 'consistent'
          config%model%bending = 'quasistatic'
+         return
+      end if
+      if (which > with_chords) then
+         config%spacecraft%motion = merge('free ', 'fixed', which <= with_chords + 2)
+         config%model%formulation = 'inextensible'
+         config%model%bending_shapes = 2 + mod(which, 2)
+         config%model%gauss_points = 5
          return
       end if
       if (which > with_two_shapes) then
@@ -129,6 +136,11 @@ contains
       if (n > 1) config%chain%length(2) = config%chain%length(1) ! not quite distinct rods
       if (mod(n, 4) >= 2) call vary_rods(config, n)
       call random_initial(config, n)
+      if (which > with_chords) then ! slopes that the model is made for: their second powers count
+         config%initial%alpha = 0.3_wp*config%initial%alpha
+         config%initial%beta = 0.3_wp*config%initial%beta
+         if (allocated(config%initial%bubble)) config%initial%bubble = 0.3_wp*config%initial%bubble
+      end if
       call random_loads(config, n)
    end subroutine random_case
 

@@ -26,10 +26,12 @@ COUNTS = pathlib.Path(__file__).with_name("counts.json")
 TOLERANCE = 1.01
 KINDS = {  # kind: two numbers of calls whose difference is counted
     "rhs": (1000, 3000),
+    "rhs_inextensible": (1000, 3000),
     "rhs_rigid": (1000, 3000),
     "rhs_lumped": (1000, 3000),
     "rhs_condensed": (1000, 3000),
     "lanes": (1000, 3000),
+    "lanes_inextensible": (1000, 3000),
     "run_dop853": (1, 3),
     "run_gauss": (1, 3),
     "run_adams": (1, 3),

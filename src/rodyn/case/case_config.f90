@@ -287,8 +287,8 @@ contains
       class(field_visitor), intent(inout) :: visitor
       type(model_config), intent(inout) :: model
       call visitor%open_group(group('model', help='which equations, and how they are evaluated'), 1)
-      call visitor%word_field(model%formulation, key('formulation', words='consistent|paper', &
-         help='every term kept, or second-order terms in bending dropped as in the article'))
+      call visitor%word_field(model%formulation, key('formulation', words='inextensible|consistent|paper', &
+         help='bent rods keep their arc, or their chord; paper: chord, no second-order inertia, as the article'))
       call visitor%word_field(model%inertia, key('inertia', words='distributed|lumped', &
          help='mass along the rods, or half of it at each of their ends'))
       call visitor%word_field(model%bending, key('bending', words='dynamic|quasistatic|rigid', &

@@ -10,6 +10,8 @@ module rodyn_accelerations
    use rodyn_kink_program, only: kink_regime, new_kink_regime, evaluate_kinks
    use rodyn_user_load, only: user_load
    use rodyn_recursion_flexible, only: flexible_accelerations
+   use rodyn_recursion_inextensible, only: inextensible_recursion, new_inextensible_recursion, &
+                                             inextensible_accelerations
    use rodyn_recursion_rigid, only: rigid_accelerations
    use rodyn_recursion_lumped, only: lumped_accelerations
    use rodyn_recursion_condensed, only: condensed_recursion, new_condensed_recursion, condensed_accelerations
@@ -24,7 +26,7 @@ module rodyn_accelerations
    public :: dynamics_type, new_dynamics
 
    integer, parameter :: path_flexible = 1, path_rigid = 2, path_lumped = 3, path_assembled = 4, path_joints = 5, &
-      path_condensed = 6
+      path_condensed = 6, path_inextensible = 7
 
    !> A scene with its memory and the loads that act now. One per thread.
    type :: dynamics_type
@@ -33,6 +35,7 @@ module rodyn_accelerations
       type(workspace_type) :: work
       type(assembled_system) :: system !! for the assembled kernel only
       type(condensed_recursion), allocatable :: condensed !! for rods with mass that bend by statics
+      type(inextensible_recursion), allocatable :: arcs !! for rods whose arcs keep their length
       type(joint_recursion), allocatable :: joints !! for locked hinges and the bubble; allocated when first needed
       real(wp), allocatable :: opening_acceleration(:) !! of locked hinges, given (0:n-1) [rad/s^2]
       integer :: n_locks = 0           !! how often hinges were locked or freed: what was derived from the scene is then stale
@@ -113,6 +116,10 @@ contains
          call new_condensed_recursion(self%condensed, self%scene, self%hinges)
       else if (self%scene%lumped) then
          self%path = path_lumped
+      else if (self%scene%inextensible) then
+         self%path = path_inextensible
+         if (.not. allocated(self%arcs)) allocate (self%arcs)
+         call new_inextensible_recursion(self%arcs, self%scene)
       else if (self%scene%dynamic_bending) then
          self%path = path_flexible
          self%needs_moments = .false.
@@ -327,7 +334,6 @@ contains
 
       associate (scene => self%scene, hinges => self%hinges, work => self%work, first => self%scene%n_base + 1)
          if (self%varying) call self%refresh(t, q, p)
-         call sine_cosine(scene%n, q(first), work%sine(1:), work%cosine(1:))
          if (self%needs_moments) then
             if (allocated(self%zero)) then
                call hinge_moments(hinges, scene%n, scene%dynamic_bending, self%zero, self%zero, work%theta, work%moment)
@@ -335,11 +341,15 @@ contains
                call hinge_moments(hinges, scene%n, scene%dynamic_bending, q(first), p(first), work%theta, work%moment)
             end if
          end if
+         call sine_cosine(scene%n, q(first), work%sine(1:), work%cosine(1:))
          select case (self%path)
          case (path_flexible)
             call flexible_accelerations(scene%n, scene%n_base, scene%rods, scene%rod_of, scene%node_mass, scene%body, &
                                         work%sine, work%cosine, q, p, hinges, self%forces%base, &
                                         self%regime%on_nodes, self%forces%node, work%outward, acceleration, ok)
+         case (path_inextensible)
+            call inextensible_accelerations(self%arcs, scene, work%sine, work%cosine, q, p, work%moment, self%forces%base, &
+                                            self%regime%on_nodes, self%forces%node, acceleration, ok)
          case (path_rigid)
             call rigid_accelerations(scene%n, scene%n_base, scene%rods, scene%rod_of, scene%node_mass, scene%body, &
                                      work%sine, work%cosine, p, work%moment, self%forces%base, &

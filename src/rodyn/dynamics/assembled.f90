@@ -13,6 +13,7 @@ module rodyn_assembled
    use rodyn_hinge_law, only: hinge_law
    use rodyn_bending_matrices, only: most_shapes
    use rodyn_condensed, only: whole_scene, whole_state, expand_slopes
+   use rodyn_assembled_rods, only: sum_rods
    use rodyn_locks, only: has_slaves, reduce, expand, reduce_matrix, reactions
    use rodyn_lapack, only: dpotrf, dpotrs, dgesv, dgemv
    use rodyn_text, only: formatted
@@ -233,6 +234,11 @@ contains
       real(wp), intent(in) :: node_force(2, *)
       real(wp), intent(out) :: force(:) !! (dof)
 
+      if (scene%inextensible) then
+         call sum_rods(scene, sine, cosine, q, p, loaded, node_force, system%m, force)
+         if (scene%n_base > 0) force(1:3) = force(1:3) + base_force
+         return
+      end if
       call gyration_matrix(system, scene, sine, cosine, q)
       call quadratic_rates(scene, p, system%z)
       force = 0.0_wp
@@ -405,6 +411,11 @@ contains
       integer :: i, j, k, fj, fk
       real(wp) :: mvv, normal(2), along, x(most_shapes), curved(most_shapes)
 
+      if (scene%inextensible) then
+         system%z = 0.0_wp
+         call sum_rods(scene, sine, cosine, q, system%z, .false., reshape([real(wp) ::], [2, 0]), system%m, system%row)
+         return
+      end if
       associate (m => system%m, n => scene%n)
          m = 0.0_wp
          call first_moments(system, scene, sine, cosine, q)

@@ -3,7 +3,8 @@
 module rodyn_kinematics
    use rodyn_kinds, only: wp
    use rodyn_scene, only: scene_type
-   use rodyn_bending_matrices, only: most_shapes
+   use rodyn_bending_matrices, only: bending_matrices, most_shapes
+   use rodyn_foreshortening, only: axial_inertia, crossed_inertia
    use rodyn_hinge_law, only: hinge_law, hinge_state, spring_energy
    use rodyn_three_moments, only: slopes_from_moments
    implicit none (type, external)
@@ -67,7 +68,7 @@ contains
       kinetic_energy = values%kinetic
    end function kinetic_energy
 
-   !> One pass outward. A point of rod k moves by U + W (s n - v e) + v' n, U the velocity of its inner node.
+   !> One pass outward. A point of rod k moves by U + W ((s - d) n - v e) + v' n - d' e, U the velocity of its inner node.
    pure subroutine sum_chain(scene, hinges, q, p, sums)
       type(scene_type), intent(in) :: scene
       type(hinge_law), intent(in) :: hinges
@@ -75,6 +76,7 @@ contains
       type(chain_sums), intent(out) :: sums
       real(wp) :: u(2), place(2), axis(2), normal(2), omega, w, x(most_shapes), xr(most_shapes), first(2), flow(2), spin, inertia
       real(wp), dimension(scene%n) :: alpha, beta, alpha_rate, beta_rate ! of condensed rods
+      real(wp) :: moving
       integer :: k
 
       if (scene%condensed) call slopes(scene, hinges, q, p, alpha, beta, alpha_rate, beta_rate)
@@ -90,22 +92,42 @@ contains
             x(1:2) = [alpha(k), beta(k)]
             xr(1:2) = [alpha_rate(k), beta_rate(k)]
          end if
-         associate (rod => scene%rods(scene%rod_of(k)), i => scene%rods(scene%rod_of(k))%inertia, &
-                    bend => scene%bending(scene%rod_of(k)))
-            first = i%m1*axis + dot_product(bend%first, x)*normal           ! int m (s e + v n)
+         associate (i => scene%rods(scene%rod_of(k))%inertia, bend => scene%bending(scene%rod_of(k)))
+            first = i%m1*axis + dot_product(bend%first, x)*normal           ! int m ((s - d) e + v n)
             flow = w*[-first(2), first(1)] + dot_product(bend%first, xr)*normal
-            inertia = i%m2 + dot_product(x, matmul(bend%inertia, x))
+            inertia = i%m2 + dot_product(x, matmul(bend%centrifugal, x))
             spin = w*inertia + dot_product(bend%turning, xr)
-            sums%kinetic = sums%kinetic + 0.5_wp*(i%m0*sum(u**2) + w*(2.0_wp*spin - w*inertia) + &
-                                                  dot_product(xr, matmul(bend%inertia, xr))) + dot_product(u, flow)
+            moving = dot_product(xr, matmul(bend%inertia, xr))
+            if (bend%inextensible) call shorten_sums(bend, x, xr, w, axis, normal, first, flow, inertia, spin, moving)
+            sums%kinetic = sums%kinetic + 0.5_wp*(i%m0*sum(u**2) + w*(2.0_wp*spin - w*inertia) + moving) + dot_product(u, flow)
             sums%momentum = sums%momentum + i%m0*u + flow
             sums%turning = sums%turning + cross(place, i%m0*u + flow) + cross(first, u) + spin
-            place = place + rod%length*axis
-            u = u + rod%length*w*normal
+            place = place + scene%chord(k, q)*axis
+            u = u + scene%chord(k, q)*w*normal
+            if (bend%inextensible) u = u + scene%chord_rate(k, q, p)*axis
          end associate
          call add_mass(sums, scene%node_mass(k), place, u)
       end do
    end subroutine sum_chain
+
+   !> What foreshortening adds to the sums over a rod (`rodyn_foreshortening`).
+   pure subroutine shorten_sums(bend, x, xr, w, axis, normal, first, flow, inertia, spin, moving)
+      type(bending_matrices), intent(in) :: bend
+      real(wp), intent(in) :: x(most_shapes), xr(most_shapes), w, axis(2), normal(2)
+      real(wp), intent(inout) :: first(2), flow(2), inertia, spin, moving
+      real(wp) :: drawn(most_shapes), z(most_shapes, most_shapes), q(most_shapes, most_shapes), drawn_in, added
+
+      drawn = matmul(bend%drawn, x)
+      drawn_in = 0.5_wp*dot_product(x, drawn)
+      z = crossed_inertia(bend, x)
+      q = axial_inertia(bend, x, x)
+      added = 0.25_wp*dot_product(x, matmul(q, x))
+      first = first - drawn_in*axis
+      flow = flow - w*drawn_in*normal - dot_product(xr, drawn)*axis
+      inertia = inertia + added
+      spin = spin + w*added + dot_product(matmul(x, z) - 0.5_wp*matmul(z, x), xr)
+      moving = moving + dot_product(xr, matmul(q, xr))
+   end subroutine shorten_sums
 
    !> A point mass.
    pure subroutine add_mass(sums, mass, place, u)
@@ -212,7 +234,8 @@ contains
       call at_hinge_0(scene, q, p, place, u, omega)
       do k = 1, scene%n
          associate (angle => q(scene%phi_at() + k), w => omega + p(scene%phi_at() + k))
-            u = u + scene%rods(scene%rod_of(k))%length*w*[-sin(angle), cos(angle)]
+            u = u + scene%chord(k, q)*w*[-sin(angle), cos(angle)]
+            if (scene%inextensible) u = u + scene%chord_rate(k, q, p)*[cos(angle), sin(angle)]
          end associate
          load_power = load_power + dot_product(node_force(:, k), u)
       end do

@@ -5,7 +5,7 @@ module rodyn_lane_hinges
    use rodyn_lanes, only: lanes
    implicit none (type, external)
    private
-   public :: lane_rigid_moments, lane_series_moments, lane_condensed_moments
+   public :: lane_rigid_moments, lane_flexible_moments, lane_series_moments, lane_condensed_moments
 
 contains
 
@@ -30,6 +30,29 @@ contains
       end do
       moment(:, n) = 0.0_wp
    end subroutine lane_rigid_moments
+
+   !> The same between rods that bend.
+   pure subroutine lane_flexible_moments(n, stiffness, damping, offset, phi, alpha, beta, phi_rate, alpha_rate, beta_rate, moment)
+      integer, intent(in) :: n !! rods
+      real(wp), dimension(lanes, 0:n - 1), intent(in) :: stiffness, damping, offset !! C, D, moment at rest
+      real(wp), dimension(lanes, n), intent(in) :: phi, alpha, beta, phi_rate, alpha_rate, beta_rate
+      real(wp), intent(out) :: moment(lanes, 0:n) !! T, T(n) = 0 [N m]
+      integer :: k, i
+
+      !$omp simd
+      do i = 1, lanes
+         moment(i, 0) = (stiffness(i, 0)*(phi(i, 1) + alpha(i, 1)) - offset(i, 0)) + &
+                        damping(i, 0)*(phi_rate(i, 1) + alpha_rate(i, 1))
+      end do
+      do k = 1, n - 1
+         !$omp simd
+         do i = 1, lanes
+            moment(i, k) = (stiffness(i, k)*((phi(i, k + 1) + alpha(i, k + 1)) - (phi(i, k) + beta(i, k))) - offset(i, k)) + &
+                           damping(i, k)*((phi_rate(i, k + 1) + alpha_rate(i, k + 1)) - (phi_rate(i, k) + beta_rate(i, k)))
+         end do
+      end do
+      moment(:, n) = 0.0_wp
+   end subroutine lane_flexible_moments
 
    !> Quasistatic bending: T = C G (opening - gamma) + G^T D G opening', G = (I + F C)^-1 by its factors.
    pure subroutine lane_series_moments(n, damped, stiffness, damping, kink, lower, pivot, upper, phi, phi_rate, theta, moment)

@@ -9,7 +9,7 @@
 module rodyn_lane_recursion_rigid
    use rodyn_kinds, only: wp
    use rodyn_lanes, only: lanes
-   use rodyn_lane_scene, only: lane_rod
+   use rodyn_lane_rods, only: lane_rod
    use rodyn_lane_spacecraft, only: lane_spacecraft_accelerations
    use rodyn_outboard_chain, only: lane_outboard_chain, lane_outward_size
    implicit none (type, external)

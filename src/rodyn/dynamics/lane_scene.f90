@@ -6,21 +6,13 @@
 module rodyn_lane_scene
    use rodyn_kinds, only: wp
    use rodyn_lanes, only: lanes
-   use rodyn_rod_constants, only: rod_constants
+   use rodyn_lane_rods, only: lane_rod, put_rod
    use rodyn_scene, only: scene_type
    use rodyn_hinge_law, only: hinge_law
    use rodyn_recursion_condensed, only: condensed_rod, prepare_rod
    implicit none (type, external)
    private
-   public :: lane_rod, lane_condensed_rod, lane_scene, new_lane_scene, put_scene, suits_lanes, are_alike
-
-   !> What the recursion reads of a rod (`rodyn_rod_constants`).
-   type :: lane_rod
-      real(wp), dimension(lanes) :: length, length_2, m0, m1, a1, b1, sa, sb, m0_reduced, m1_reduced, m2_reduced, central, &
-                                    length_m1, offset, outer
-      real(wp), dimension(lanes, 2) :: carry_over, g, h
-      real(wp), dimension(lanes, 3) :: stiffness, second, b_inverse
-   end type lane_rod
+   public :: lane_condensed_rod, lane_scene, new_lane_scene, put_scene, suits_lanes, are_alike
 
    !> The same of condensed rods, each between its hinges (`rodyn_recursion_condensed`).
    type :: lane_condensed_rod
@@ -35,6 +27,7 @@ module rodyn_lane_scene
       integer :: n_base = 3 !! 3: free spacecraft, 0: fixed
       integer :: n_dof = 0  !! length of p
       logical :: flexible = .true.       !! alpha and beta are unknowns
+      logical :: inextensible = .false.  !! arcs keep their length
       logical :: series = .false.        !! they follow from the hinge moments
       logical :: damped = .false.        !! some hinge has a damper, if `series`; otherwise not used
       logical :: loaded = .false.        !! some force acts on a node in some lane
@@ -69,6 +62,7 @@ contains
       type(scene_type), intent(in) :: a, b
       are_alike = a%n == b%n .and. a%n_base == b%n_base .and. (a%dynamic_bending .eqv. b%dynamic_bending) .and. &
                   (a%quasistatic .eqv. b%quasistatic) .and. (a%condensed .eqv. b%condensed) .and. &
+                  (a%inextensible .eqv. b%inextensible) .and. &
                   (has_series_dampers(a) .eqv. has_series_dampers(b)) .and. &
                   (any(a%loads%loads%node > 0) .eqv. any(b%loads%loads%node > 0))
    end function are_alike
@@ -90,6 +84,7 @@ contains
       group%n_base = scene%n_base
       group%n_dof = scene%n_dof
       group%flexible = scene%dynamic_bending
+      group%inextensible = scene%inextensible
       group%series = scene%quasistatic
       group%damped = has_series_dampers(scene)
       associate (n => scene%n)
@@ -148,34 +143,6 @@ contains
          call put_condensed_rod(group%condensed(k), lane, condensed)
       end do
    end subroutine put_scene
-
-   pure subroutine put_rod(rods, lane, rod)
-      type(lane_rod), intent(inout) :: rods
-      integer, intent(in) :: lane
-      type(rod_constants), intent(in) :: rod
-
-      rods%length(lane) = rod%length
-      rods%length_2(lane) = rod%length_2
-      rods%m0(lane) = rod%inertia%m0
-      rods%m1(lane) = rod%inertia%m1
-      rods%a1(lane) = rod%inertia%a1
-      rods%b1(lane) = rod%inertia%b1
-      rods%sa(lane) = rod%inertia%sa
-      rods%sb(lane) = rod%inertia%sb
-      rods%m0_reduced(lane) = rod%m0_reduced
-      rods%m1_reduced(lane) = rod%m1_reduced
-      rods%m2_reduced(lane) = rod%m2_reduced
-      rods%central(lane) = rod%central
-      rods%length_m1(lane) = rod%length_m1
-      rods%offset(lane) = rod%offset
-      rods%outer(lane) = rod%outer
-      rods%carry_over(lane, :) = rod%carry_over
-      rods%g(lane, :) = rod%g
-      rods%h(lane, :) = rod%h
-      rods%stiffness(lane, :) = rod%stiffness
-      rods%second(lane, :) = rod%second
-      rods%b_inverse(lane, :) = rod%b_inverse
-   end subroutine put_rod
 
    pure subroutine put_condensed_rod(rods, lane, rod)
       type(lane_condensed_rod), intent(inout) :: rods

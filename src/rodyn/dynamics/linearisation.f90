@@ -9,11 +9,12 @@ module rodyn_linearisation
    use rodyn_kinds, only: wp
    use rodyn_scene, only: scene_type
    use rodyn_bending_matrices, only: most_shapes
+   use rodyn_foreshortening, only: shorten_tangent
    use rodyn_hinge_law, only: hinge_law, hinge_tangent
    use rodyn_condensed, only: whole_scene, whole_state, expand_slopes, reduce_slopes
    implicit none (type, external)
    private
-   public :: balance_tangent
+   public :: balance_tangent, differentiate_rod
 
 contains
 
@@ -94,7 +95,7 @@ contains
          inner(:, k) = node
          d_inner(:, k) = d_node
          x = scene%phi_at() + k
-         length = scene%rods(scene%rod_of(k))%length
+         length = scene%chord(k, q)
          e = [cos(q(x)), sin(q(x))]
          n = [-e(2), e(1)]
          w = omega + p(x)
@@ -102,8 +103,34 @@ contains
          wr = omega_rate + a(x)
          node = node + length*(wr*n - w**2*e)
          d_node = d_node + length*(-dq(x)*(wr*e + w**2*n) - 2.0_wp*w*dw*e)
+         if (scene%inextensible) call draw_node(scene, k, q, p, a, dq, dp, e, n, w, dw, wr, node, d_node)
       end do
    end subroutine outward_pass
+
+   !> What foreshortening adds to the acceleration of the outer node of rod k, l'' e + 2 l' W n, and to its change.
+   pure subroutine draw_node(scene, k, q, p, a, dq, dp, e, n, w, dw, wr, node, d_node)
+      type(scene_type), intent(in) :: scene
+      integer, intent(in) :: k
+      real(wp), intent(in) :: q(:), p(:), a(:), dq(:), dp(:), e(2), n(2), w, dw, wr
+      real(wp), intent(inout) :: node(2), d_node(2)
+      real(wp), dimension(most_shapes) :: u, dx, du, acc, slope, d_slope
+      real(wp) :: along, across, d_along, d_across
+
+      associate (shortening => scene%bending(scene%rod_of(k))%shortening, d_phi => dq(scene%phi_at() + k))
+         u = scene%bends(k, p)
+         acc = scene%bends(k, a)
+         dx = scene%bends(k, dq)
+         du = scene%bends(k, dp)
+         slope = matmul(shortening, scene%bends(k, q))
+         d_slope = matmul(shortening, dx)
+         along = -dot_product(slope, acc) - dot_product(u, matmul(shortening, u))
+         across = -2.0_wp*w*dot_product(slope, u)
+         d_along = -dot_product(d_slope, acc) - 2.0_wp*dot_product(u, matmul(shortening, du))
+         d_across = -2.0_wp*(dw*dot_product(slope, u) + w*(dot_product(d_slope, u) + dot_product(slope, du)))
+         node = node + along*e + across*n
+         d_node = d_node + d_along*e + d_across*n + d_phi*(along*n - across*e) - dot_product(slope, dx)*(wr*n - w**2*e)
+      end associate
+   end subroutine draw_node
 
    !> Inertia forces and rows of the balance, from the tip inward. A force with components (fe, fn) along and
    !> across rod k changes by d(fe), d(fn) and turns with the rod.
@@ -136,14 +163,16 @@ contains
          w = omega + p(f)
          dw = d_omega + dp(f)
          wr = omega_rate + a(f)
-         associate (rod => scene%rods(scene%rod_of(k)))
-            node = inner(:, k) + rod%length*(wr*n - w**2*e)
-            d_node = d_inner(:, k) + rod%length*(-dq(f)*(wr*e + w**2*n) - 2.0_wp*w*dw*e)
+         associate (length => scene%chord(k, q))
+            node = inner(:, k) + length*(wr*n - w**2*e)
+            d_node = d_inner(:, k) + length*(-dq(f)*(wr*e + w**2*n) - 2.0_wp*w*dw*e)
+            if (scene%inextensible) call draw_node(scene, k, q, p, a, dq, dp, e, n, w, dw, wr, node, d_node)
             force = force + scene%node_mass(k)*node
             d_force = d_force + scene%node_mass(k)*d_node
             if (loaded) force = force - node_force(:, k)
-            dr(f) = rod%length*(dot_product(n, d_force) - dq(f)*dot_product(e, force)) - (moment(k) - moment(k - 1))
+            dr(f) = length*(dot_product(n, d_force) - dq(f)*dot_product(e, force)) - (moment(k) - moment(k - 1))
          end associate
+         if (scene%inextensible) call pull_slopes(scene, k, q, dq, e, n, force, d_force, dr)
          call add_rod(scene, k, q, p, a, dq, dp, e, n, w, dw, wr, inner(:, k), d_inner(:, k), moment, force, d_force, dr)
          turn = turn + dr(f)
       end do
@@ -158,6 +187,27 @@ contains
       end associate
    end subroutine inward_pass
 
+   !> The force on the outer node of rod k in the rows of its chord's direction and of its bending coordinates, which move the node
+   !> by dl = -slope.dx.
+   pure subroutine pull_slopes(scene, k, q, dq, e, n, force, d_force, dr)
+      type(scene_type), intent(in) :: scene
+      integer, intent(in) :: k
+      real(wp), intent(in) :: q(:), dq(:), e(2), n(2), force(2), d_force(2)
+      real(wp), intent(inout) :: dr(:)
+      real(wp), dimension(most_shapes) :: slope, dx, row
+      integer :: f, j
+
+      f = scene%phi_at() + k
+      dx = scene%bends(k, dq)
+      slope = matmul(scene%bending(scene%rod_of(k))%shortening, scene%bends(k, q))
+      dr(f) = dr(f) - dot_product(slope, dx)*dot_product(n, force)
+      row = -matmul(scene%bending(scene%rod_of(k))%shortening, dx)*dot_product(e, force) - &
+            slope*(dot_product(e, d_force) + dq(f)*dot_product(n, force))
+      do j = 1, scene%n_bend
+         dr(scene%bend_at(j) + k) = row(j)
+      end do
+   end subroutine pull_slopes
+
    !> Rows of rod k, docs/model.md sec. 3, and its share of the force on the inner node.
    pure subroutine add_rod(scene, k, q, p, a, dq, dp, e, n, w, dw, wr, inner, d_inner, moment, force, d_force, dr)
       type(scene_type), intent(in) :: scene
@@ -165,52 +215,62 @@ contains
       real(wp), intent(in) :: q(:), p(:), a(:), dq(:), dp(:)
       real(wp), intent(in) :: e(2), n(2), w, dw, wr, inner(2), d_inner(2), moment(0:)
       real(wp), intent(inout) :: force(2), d_force(2), dr(:)
-      real(wp) :: ae, an, d_ae, d_an, fe, fn, d_fe, d_fn, d_phi
-      real(wp), dimension(most_shapes) :: x, v, acc, dx, dv, row, sx
-      real(wp) :: mv, d_mv, d_mv_rate, mv_rate
+      real(wp) :: ae, an, own(2), change(3 + most_shapes)
       integer :: f, j
 
       f = scene%phi_at() + k
-      d_phi = dq(f)
       ae = dot_product(inner, e)
       an = dot_product(inner, n)
-      d_ae = dot_product(d_inner, e) + d_phi*an
-      d_an = dot_product(d_inner, n) - d_phi*ae
-      associate (rod => scene%rods(scene%rod_of(k)), i => scene%rods(scene%rod_of(k))%inertia)
-         fe = i%m0*ae - w**2*i%m1
-         fn = i%m0*an + wr*i%m1
-         d_fe = i%m0*d_ae - 2.0_wp*w*dw*i%m1
-         d_fn = i%m0*d_an
-         dr(f) = dr(f) + i%m1*d_an
+      associate (d_phi => dq(f))
+         call differentiate_rod(scene, k, scene%bends(k, q), scene%bends(k, p), scene%bends(k, a), w, wr, ae, an, &
+                                scene%bends(k, dq), scene%bends(k, dp), dw, dot_product(d_inner, e) + d_phi*an, &
+                                dot_product(d_inner, n) - d_phi*ae, own, change)
+         dr(f) = dr(f) + change(3)
          if (scene%dynamic_bending) then
-            associate (bend => scene%bending(scene%rod_of(k)))
-               x = scene%bends(k, q)
-               v = scene%bends(k, p)
-               acc = scene%bends(k, a)
-               dx = scene%bends(k, dq)
-               dv = scene%bends(k, dp)
-               mv = dot_product(bend%first, x)
-               mv_rate = dot_product(bend%first, v)
-               d_mv = dot_product(bend%first, dx)
-               d_mv_rate = dot_product(bend%first, dv)
-               fe = fe - wr*mv - 2.0_wp*w*mv_rate
-               fn = fn - w**2*mv + dot_product(bend%first, acc)
-               d_fe = d_fe - wr*d_mv - 2.0_wp*(dw*mv_rate + w*d_mv_rate)
-               d_fn = d_fn - 2.0_wp*w*dw*mv - w**2*d_mv
-               sx = matmul(bend%second, x)
-               dr(f) = dr(f) - d_mv*ae - mv*d_ae + 2.0_wp*wr*dot_product(sx, dx) + 2.0_wp*dw*dot_product(sx, v) + &
-                       2.0_wp*w*(dot_product(matmul(bend%second, dx), v) + dot_product(sx, dv))
-               row = bend%first*d_an - matmul(bend%inertia, 2.0_wp*w*dw*x + w**2*dx) + matmul(bend%stiffness, dx)
-               row(1) = row(1) + moment(k - 1)
-               row(2) = row(2) - moment(k)
-               do j = 1, scene%n_bend
-                  dr(scene%bend_at(j) + k) = row(j)
-               end do
-            end associate
+            change(4) = change(4) + moment(k - 1)
+            change(5) = change(5) - moment(k)
          end if
-         force = force + fe*e + fn*n
-         d_force = d_force + (d_fe - d_phi*fn)*e + (d_fn + d_phi*fe)*n
+         do j = 1, scene%n_bend
+            dr(scene%bend_at(j) + k) = dr(scene%bend_at(j) + k) + change(3 + j)
+         end do
+         force = force + own(1)*e + own(2)*n
+         d_force = d_force + (change(1) - d_phi*own(2))*e + (change(2) + d_phi*own(1))*n
       end associate
    end subroutine add_rod
+
+   !> Force of rod k on its inner node and its change, and that of the rows of W and x, without hinges and chain: in the axes of the
+   !> rod, with W' and x'' held fixed.
+   pure subroutine differentiate_rod(scene, k, x, v, acc, w, wr, ae, an, dx, dv, dw, d_ae, d_an, own, change)
+      type(scene_type), intent(in) :: scene
+      integer, intent(in) :: k
+      real(wp), dimension(most_shapes), intent(in) :: x, v, acc, dx, dv !! bending coordinates, rates, accelerations; changes
+      real(wp), intent(in) :: w, wr, ae, an, dw, d_ae, d_an
+      real(wp), intent(out) :: own(2), change(3 + most_shapes)
+      real(wp) :: mv, d_mv, d_mv_rate, mv_rate, drawn(most_shapes), drawn_in, sx(most_shapes)
+
+      associate (i => scene%rods(scene%rod_of(k))%inertia, bend => scene%bending(scene%rod_of(k)))
+         own = [i%m0*ae - w**2*i%m1, i%m0*an + wr*i%m1]
+         change = 0.0_wp
+         change(1:3) = [i%m0*d_ae - 2.0_wp*w*dw*i%m1, i%m0*d_an, i%m1*d_an]
+         if (.not. scene%dynamic_bending) return
+         mv = dot_product(bend%first, x)
+         mv_rate = dot_product(bend%first, v)
+         d_mv = dot_product(bend%first, dx)
+         d_mv_rate = dot_product(bend%first, dv)
+         own = own + [-wr*mv - 2.0_wp*w*mv_rate, dot_product(bend%first, acc) - w**2*mv]
+         sx = matmul(bend%second, x)
+         change(1) = change(1) - wr*d_mv - 2.0_wp*(dw*mv_rate + w*d_mv_rate)
+         change(2) = change(2) - 2.0_wp*w*dw*mv - w**2*d_mv
+         change(3) = change(3) - d_mv*ae - mv*d_ae + 2.0_wp*wr*dot_product(sx, dx) + 2.0_wp*dw*dot_product(sx, v) + &
+                     2.0_wp*w*(dot_product(matmul(bend%second, dx), v) + dot_product(sx, dv))
+         change(4:) = bend%first*d_an - matmul(bend%centrifugal, 2.0_wp*w*dw*x + w**2*dx) + matmul(bend%stiffness, dx)
+         if (.not. bend%inextensible) return
+         drawn = matmul(bend%drawn, x)
+         drawn_in = 0.5_wp*dot_product(x, drawn)
+         own(1) = own(1) + w**2*drawn_in - dot_product(v, matmul(bend%drawn, v)) - dot_product(drawn, acc)
+         own(2) = own(2) - wr*drawn_in - 2.0_wp*w*dot_product(drawn, v)
+         call shorten_tangent(bend, x, v, acc, w, wr, ae, an, dx, dv, dw, d_ae, d_an, change)
+      end associate
+   end subroutine differentiate_rod
 
 end module rodyn_linearisation

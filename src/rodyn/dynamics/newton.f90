@@ -17,6 +17,7 @@ module rodyn_newton
    use rodyn_newton_chain, only: rod_factor, factorise_chain, reduce_chain, expand_chain
    use rodyn_newton_condensed, only: condensed_newton, new_condensed_newton, linearise_condensed, factorise_condensed, &
       reduce_condensed, expand_condensed
+   use rodyn_newton_arcs, only: arc_tangent, linearise_arcs, factorise_arcs, reduce_arcs, expand_arcs
    use rodyn_newton_series, only: series_factor, factorise_series, reduce_series, expand_series, of_opening
    implicit none (type, external)
    private
@@ -28,6 +29,7 @@ module rodyn_newton
       real(wp) :: gamma = 0.0_wp              !! of the factors [s]
       logical :: series = .false.             !! massless rods that bend
       type(rod_tangent), allocatable :: tangent(:)   !! (n)
+      type(arc_tangent), allocatable :: arc(:)       !! (n) instead, of rods whose arcs keep their length
       type(rod_factor), allocatable :: factor(:)     !! (n), or
       type(series_factor), allocatable :: damped(:)  !! (n)
       type(condensed_newton), allocatable :: condensed !! for condensed rods
@@ -59,9 +61,11 @@ contains
       logical, intent(in) :: loaded                !! node_force is to be used
       real(wp), intent(in) :: node_force(:, :)     !! X, Y at the nodes (2, n) [N]
 
-      if (.not. allocated(self%tangent)) call allocate_newton(self, scene, hinges)
+      if (.not. allocated(self%hinge)) call allocate_newton(self, scene, hinges)
       if (scene%condensed) then
          call linearise_condensed(self%condensed, scene, hinges, sine, cosine, q, p, a, loaded, node_force, self%tangent)
+      else if (scene%inextensible) then
+         call linearise_arcs(scene, sine, cosine, q, p, a, loaded, node_force, self%arc)
       else
          call linearise_rods(scene, sine, cosine, q, p, a, loaded, node_force, self%tangent)
       end if
@@ -78,7 +82,12 @@ contains
 
       self%series = scene%lumped .and. scene%quasistatic
       associate (n => scene%n)
-         allocate (self%tangent(n), self%hinge(0:n - 1), self%moment(0:n), self%opening(0:n - 1))
+         if (scene%inextensible) then
+            allocate (self%arc(n))
+         else
+            allocate (self%tangent(n))
+         end if
+         allocate (self%hinge(0:n - 1), self%moment(0:n), self%opening(0:n - 1))
          allocate (self%damping(0:n - 1), source=hinges%damping)
          if (size(hinges%relaxing) > 0) self%damping = 0.0_wp
          allocate (self%angle(scene%n_q), self%rate(scene%n_dof))
@@ -116,8 +125,12 @@ contains
                                   self%tangent, self%damped, apparent, by_omega, ok)
          else
             self%hinge = gamma*(gamma*law%stiffness + law%damping)
-            call factorise_chain(scene%n, gamma, scene%dynamic_bending, scene%rods, scene%rod_of, scene%node_mass, self%hinge, &
-                                 self%tangent, self%factor, apparent, by_omega, ok)
+            if (scene%inextensible) then
+               call factorise_arcs(scene%n, gamma, scene%node_mass, self%hinge, self%arc, self%factor, apparent, by_omega, ok)
+            else
+               call factorise_chain(scene%n, gamma, scene%dynamic_bending, scene%rods, scene%rod_of, scene%node_mass, &
+                                    self%hinge, self%tangent, self%factor, apparent, by_omega, ok)
+            end if
          end if
       end associate
       if (.not. ok .or. scene%n_base == 0) return
@@ -202,6 +215,11 @@ contains
          else if (self%series) then
             call reduce_series(scene%n, scene%rods, scene%rod_of, self%tangent, self%damped, d_omega, dq(f:), dp(f:), &
                                self%moment, self%left, known)
+         else if (scene%inextensible) then
+            associate (a => scene%alpha_at() + 1, b => scene%beta_at() + 1)
+               call reduce_arcs(scene%n, self%hinge, self%arc, self%factor, d_omega, dq(f:), dq(a:), dq(b:), dp(f:), dp(a:), &
+                                dp(b:), self%moment, self%left, known)
+            end associate
          else if (scene%dynamic_bending) then
             associate (a => scene%alpha_at() + 1, b => scene%beta_at() + 1)
                call reduce_chain(scene%n, .true., scene%rods, scene%rod_of, self%hinge, self%tangent, self%factor, &
@@ -225,6 +243,11 @@ contains
          else if (self%series) then
             call expand_series(scene%n, scene%rods, scene%rod_of, self%tangent, self%damped, d_omega, dq(f:), dp(f:), &
                                omega_rate, a(1), a(2), self%left)
+         else if (scene%inextensible) then
+            associate (first => scene%alpha_at() + 1, last => scene%beta_at() + 1)
+               call expand_arcs(scene%n, self%gamma, self%arc, self%factor, d_omega, dq(f:), dq(first:), dq(last:), dp(f:), &
+                                dp(first:), dp(last:), omega_rate, a, self%left)
+            end associate
          else
             call expand_chain(scene%n, scene%dynamic_bending, scene%rods, scene%rod_of, self%tangent, self%factor, d_omega, &
                               dq(f:), dp(f:), omega_rate, a(1), a(2), self%left)

@@ -20,7 +20,7 @@ module rodyn_newton_chain
    use rodyn_newton_tangent, only: rod_tangent
    implicit none (type, external)
    private
-   public :: rod_factor, factorise_chain, reduce_chain, expand_chain
+   public :: rod_factor, factorise_chain, reduce_chain, expand_chain, eliminate_slopes, eliminate_turn, turn_axes
 
    !> What elimination of a rod leaves for the solutions. Columns: dAe, dAn, w', t.
    type :: rod_factor

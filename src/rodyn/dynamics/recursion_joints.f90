@@ -20,18 +20,22 @@ module rodyn_recursion_joints
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp
    use rodyn_rod_integrals, only: rod_integrals
+   use rodyn_foreshortening, only: shorten
    use rodyn_scene, only: scene_type
    use rodyn_bending_matrices, only: bending_matrices, most_shapes
    implicit none (type, external)
    private
-   public :: joint_recursion, new_joint_recursion, joint_accelerations
+   public :: joint_recursion, new_joint_recursion, joint_accelerations, rod_alone
 
    integer, parameter :: most = 3 + most_shapes !! unknowns of a rod at most: A, tau, x
 
    !> What the inward pass leaves of a rod for the outward pass.
    type :: rod_pass
       real(wp) :: cd = 1.0_wp, sd = 0.0_wp !! cosine and sine of the turn from the axes of rod k - 1
-      real(wp) :: fall = 0.0_wp            !! l W^2 [m/s^2]
+      real(wp) :: fall = 0.0_wp            !! l W^2, of the outer node against e beside -(l)'' of x'' [m/s^2]
+      real(wp) :: across = 0.0_wp          !! 2 W l', of the outer node along n [m/s^2]
+      real(wp) :: chord = 0.0_wp           !! l, the chord [m]
+      real(wp) :: slope(most_shapes) = 0.0_wp !! -dl/dx: zero unless `inextensible`
       real(wp) :: x0(most_shapes) = 0.0_wp, x(most_shapes, 3) = 0.0_wp !! x'' = x0 - x (A, tau)
       real(wp) :: t0 = 0.0_wp, t(3) = 0.0_wp !! free inside: tau = t0 - t(1:2) A; locked: -T = t0 + t (A, tau)
    end type rod_pass
@@ -129,9 +133,16 @@ contains
       w = p(scene%phi_at() + k)
       if (scene%n_base > 0) w = w + p(3)
       associate (rod => scene%rods(scene%rod_of(k)))
+         pass%chord = rod%length
          pass%fall = rod%length*w**2
          call rod_alone(rod%inertia, bending, scene%bends(k, q), scene%bends(k, p), w, elastic, h, c)
-         call add_chain(rod%length, bending%n > 0, inertia, bias - pass%fall*inertia(:, 1), h, c)
+         if (bending%inextensible) then
+            call draw_in(rod%length, bending, scene%bends(k, q), scene%bends(k, p), w, pass, h, c)
+            call add_chain(pass%chord, .true., inertia, bias - pass%fall*inertia(:, 1) + pass%across*inertia(:, 2), h, c)
+            call pull_slopes(pass%chord, pass%slope, inertia, bias(1) - pass%fall*inertia(1, 1) + pass%across*inertia(1, 2), h, c)
+         else
+            call add_chain(rod%length, bending%n > 0, inertia, bias - pass%fall*inertia(:, 1), h, c)
+         end if
       end associate
       if (bending%n > 0) then ! W' = tau - alpha'': the column, then the row of alpha
          h(4, 4) = h(4, 4) - h(3, 4)
@@ -170,9 +181,41 @@ contains
       c(1) = -w**2*integrals%m1 - 2.0_wp*w*dot_product(bending%first, rate)
       c(2) = -w**2*mv
       c(3) = 2.0_wp*w*dot_product(rate, curved)
-      c(4:) = -w**2*matmul(bending%inertia, x)
+      c(4:) = -w**2*matmul(bending%centrifugal, x)
       if (elastic) c(4:) = c(4:) + matmul(bending%stiffness, x)
    end subroutine rod_alone
+
+   !> What foreshortening changes of a rod alone, and the motion of its outer node (docs/model.md sec. 3, `inextensible`).
+   pure subroutine draw_in(length, bending, x, rate, w, pass, h, c)
+      real(wp), intent(in) :: length
+      type(bending_matrices), intent(in) :: bending
+      real(wp), intent(in) :: x(most_shapes), rate(most_shapes), w
+      type(rod_pass), intent(inout) :: pass
+      real(wp), intent(inout) :: h(most, most), c(most)
+
+      call shorten(bending, x, rate, w, h, c)
+      pass%slope = matmul(bending%shortening, x)
+      pass%chord = length - 0.5_wp*dot_product(x, pass%slope)
+      pass%fall = pass%chord*w**2 + dot_product(rate, matmul(bending%shortening, rate))
+      pass%across = -2.0_wp*w*dot_product(rate, pass%slope)
+   end subroutine draw_in
+
+   !> The chain beyond pulls on the bending coordinates, whose x'' move the outer node by -slope.x'' along the rod.
+   pure subroutine pull_slopes(length, slope, inertia, outer, h, c)
+      real(wp), intent(in) :: length, slope(most_shapes)
+      real(wp), intent(in) :: inertia(3, 3), outer !! P; along the rod: b with the fall of node k
+      real(wp), intent(inout) :: h(most, most), c(most)
+      integer :: j
+
+      do j = 1, most_shapes
+         h(1, 3 + j) = h(1, 3 + j) - inertia(1, 1)*slope(j)
+         h(2, 3 + j) = h(2, 3 + j) - inertia(1, 2)*slope(j)
+         h(3, 3 + j) = h(3, 3 + j) - (inertia(1, 3) + length*inertia(1, 2))*slope(j)
+         h(4:3 + j, 3 + j) = h(4:3 + j, 3 + j) + inertia(1, 1)*slope(:j)*slope(j)
+         h(min(5, 3 + j), max(5, 3 + j)) = h(min(5, 3 + j), max(5, 3 + j)) - merge(2.0_wp, 1.0_wp, j == 2)*inertia(1, 3)*slope(j)
+      end do
+      c(4:) = c(4:) - slope*outer
+   end subroutine pull_slopes
 
    !> The chain beyond, which node k moves by A + l n W' - l W^2 e and the end tangent turns by W' + beta''.
    pure subroutine add_chain(length, bends, inertia, outer, h, c)
@@ -326,7 +369,7 @@ contains
 
       omega_rate = node(3)
       do k = 1, scene%n
-         associate (pass => recursion%pass(k), length => scene%rods(scene%rod_of(k))%length)
+         associate (pass => recursion%pass(k))
             nb = scene%n_bend
             node(1:2) = [pass%cd*node(1) + pass%sd*node(2), pass%cd*node(2) - pass%sd*node(1)]
             if (locked(k - 1)) then
@@ -346,7 +389,8 @@ contains
             end if
             acceleration(scene%phi_at() + k) = w_rate - omega_rate
             node(1) = node(1) - pass%fall
-            node(2) = node(2) + length*w_rate
+            node(2) = node(2) + pass%chord*w_rate
+            if (scene%inextensible) node(1:2) = node(1:2) + [-dot_product(pass%slope(:nb), bent(:nb)), pass%across]
          end associate
       end do
    end subroutine outward_pass

@@ -16,7 +16,13 @@ module rodyn_bending_matrices
       real(wp) :: first(most_shapes) = 0.0_wp            !! int m N [kg m]
       real(wp) :: turning(most_shapes) = 0.0_wp          !! int m s N [kg m^2]
       real(wp) :: inertia(most_shapes, most_shapes) = 0.0_wp   !! B = int m N N^T [kg m^2]
-      real(wp) :: second(most_shapes, most_shapes) = 0.0_wp    !! B where it is of second order: zero in `paper`
+      real(wp) :: second(most_shapes, most_shapes) = 0.0_wp    !! of second order in int m |r|^2: B; B - S if `inextensible`; zero in `paper`
+      real(wp) :: centrifugal(most_shapes, most_shapes) = 0.0_wp !! W^2 on x: B; B - S if `inextensible` [kg m^2]
+      real(wp) :: shortening(most_shapes, most_shapes) = 0.0_wp  !! D(l) of the foreshortening (`rodyn_rod_integrals`) [m]
+      real(wp) :: drawn(most_shapes, most_shapes) = 0.0_wp     !! E = int m D [kg m]
+      logical :: inextensible = .false.                  !! the arc keeps its length: D, E, S are not zero
+      real(wp) :: across(most_shapes, 6) = 0.0_wp        !! int m N_a D_i [kg m^2]
+      real(wp) :: products(6, 6) = 0.0_wp                !! int m D_i D_j [kg m^2]
       real(wp) :: stiffness(most_shapes, most_shapes) = 0.0_wp !! elastic energy is x^T stiffness x / 2 [N m]
    end type bending_matrices
 
@@ -28,6 +34,7 @@ contains
       integer, intent(in) :: n          !! bending coordinates: 0, 2 or 3
       logical, intent(in) :: consistent !! keep second-order inertia
       type(bending_matrices) :: bending
+      integer :: last
 
       bending%n = n
       if (n == 0) return
@@ -37,9 +44,16 @@ contains
          bending%first(n + 1:) = 0.0_wp
          bending%turning(n + 1:) = 0.0_wp
          call fill(bending%inertia, n, [i%aa, i%ab, i%bb, i%ac, i%bc, i%cc])
-         if (consistent) bending%second = bending%inertia
+         call fill(bending%centrifugal, n, [i%aa, i%ab, i%bb, i%ac, i%bc, i%cc] - rod%shortening%second)
+         if (consistent) bending%second = bending%centrifugal
          call fill(bending%stiffness, n, [rod%stiffness, rod%bubble])
       end associate
+      call fill(bending%shortening, n, rod%shortening%chord)
+      call fill(bending%drawn, n, rod%shortening%first)
+      bending%inextensible = bending%shortening(1, 1) > 0.0_wp
+      last = n*(n + 1)/2
+      bending%across(:n, :last) = rod%shortening%across(:n, :last)
+      bending%products(:last, :last) = rod%shortening%products(:last, :last)
    end function new_bending_matrices
 
    !> The first n rows and columns of a symmetric matrix, from (1,1), (1,2), (2,2), (1,3), (2,3), (3,3).

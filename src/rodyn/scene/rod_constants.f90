@@ -3,7 +3,8 @@ module rodyn_rod_constants
    use rodyn_kinds, only: wp
    use rodyn_quadrature, only: gauss_rule, new_gauss_rule, composite_rule
    use rodyn_rod_bending, only: slope_stiffness, slope_flexibility, inverse_of_flexibility
-   use rodyn_rod_integrals, only: rod_integrals, new_rod_integrals, bubble_stiffness
+   use rodyn_rod_integrals, only: rod_integrals, new_rod_integrals, bubble_stiffness, &
+                                  shortening_integrals, new_shortening_integrals
    use rodyn_rod_profile, only: rod_profile
    implicit none (type, external)
    private
@@ -24,7 +25,8 @@ module rodyn_rod_constants
       type(rod_integrals) :: inertia         !! all zero when lumped; shape integrals zero when rigid
       real(wp) :: bubble(3) = 0.0_wp         !! int EI N'' Nc'' with Na, Nb, Nc
       real(wp) :: share(2) = 0.0_wp          !! mass that goes to the inner and the outer node when lumped [kg]
-      real(wp) :: second(3) = 0.0_wp         !! aa, ab, bb where they are of second order: zero in `paper`
+      type(shortening_integrals) :: shortening !! zero unless the arc of the rod keeps its length
+      real(wp) :: second(3) = 0.0_wp         !! of second order in m2: aa, ab, bb; less S if `inextensible`; zero in `paper`
       real(wp) :: b_inverse(3) = 0.0_wp      !! B^-1: (1,1), (1,2), (2,2) [1/(kg m^2)]
       real(wp) :: g(2) = 0.0_wp              !! [1/m]
       real(wp) :: h(2) = 0.0_wp              !! [1]
@@ -36,13 +38,15 @@ module rodyn_rod_constants
       real(wp) :: length_m1 = 0.0_wp         !! l m1 of the reduced inertias [kg m^2]
       real(wp) :: offset = 0.0_wp            !! l m0 - m1 of them [kg m]
       real(wp) :: outer = 0.0_wp             !! m2 - 2 l m1 + l^2 m0 of them: moment about the outer node [kg m^2]
+      real(wp) :: by_chord(2, 2) = 0.0_wp    !! B^-1 D(l) [1/(kg m)]
+      real(wp) :: by_first(2, 2) = 0.0_wp    !! B^-1 E [1/m]
    end type rod_constants
 
 contains
 
    !> Constants of a rod. Profiles multiply its mass per length and its bending stiffness; without them it is uniform.
    pure subroutine new_rod_constants(rod, length, mass_per_length, bending_stiffness, rule, lumped, flexible, &
-                                     consistent, ok, mass_profile, stiffness_profile)
+                                     consistent, ok, mass_profile, stiffness_profile, inextensible)
       type(rod_constants), intent(out) :: rod
       real(wp), intent(in) :: length            !! l [m]
       real(wp), intent(in) :: mass_per_length   !! m [kg/m]
@@ -53,19 +57,23 @@ contains
       logical, intent(in) :: consistent         !! keep second-order inertia
       logical, intent(out) :: ok                !! false: B, or the stiffness of the slopes, is not positive definite
       type(rod_profile), intent(in), optional :: mass_profile, stiffness_profile
+      logical, intent(in), optional :: inextensible !! the arc keeps its length, not the chord
+      logical :: shortens
 
       ok = .true.
+      shortens = .false.
+      if (present(inextensible)) shortens = flexible .and. inextensible
       rod%length = length
       rod%length_2 = length**2
       rod%bending_stiffness = bending_stiffness
       if (bending_stiffness > 0.0_wp) call resist_bending(rod, rule, flexible, ok, stiffness_profile)
-      call integrate_mass(rod, mass_per_length, rule, lumped, mass_profile)
+      call integrate_mass(rod, mass_per_length, rule, lumped, shortens, mass_profile)
       if (lumped .or. .not. ok) return
       if (.not. (flexible .or. bending_stiffness > 0.0_wp)) then
          call stiffen(rod)
          return
       end if
-      if (consistent) rod%second = [rod%inertia%aa, rod%inertia%ab, rod%inertia%bb]
+      if (consistent) rod%second = [rod%inertia%aa, rod%inertia%ab, rod%inertia%bb] - rod%shortening%second(:3)
       if (.not. flexible) return
       call reduce(rod, ok)
       call join_chain(rod)
@@ -124,17 +132,18 @@ contains
    end subroutine resist_bending
 
    !> Integrals over the mass, or what of it goes to the nodes: half, or what keeps the centre of mass in its place.
-   pure subroutine integrate_mass(rod, mass_per_length, rule, lumped, profile)
+   pure subroutine integrate_mass(rod, mass_per_length, rule, lumped, shortens, profile)
       type(rod_constants), intent(inout) :: rod
       real(wp), intent(in) :: mass_per_length
       type(gauss_rule), intent(in) :: rule
-      logical, intent(in) :: lumped
+      logical, intent(in) :: lumped, shortens
       type(rod_profile), intent(in), optional :: profile
       type(gauss_rule) :: finer
 
       if (is_varying(profile)) then
          finer = rule_for(profile, rule)
          rod%inertia = new_rod_integrals(rod%length, mass_per_length*profile%at(finer%points), finer)
+         if (shortens) rod%shortening = new_shortening_integrals(rod%length, mass_per_length*profile%at(finer%points), finer)
          associate (i => rod%inertia)
             rod%share = [i%m0 - i%m1/rod%length, i%m1/rod%length]
          end associate
@@ -142,6 +151,7 @@ contains
          rod%share = 0.5_wp*rod%length*mass_per_length
       else
          rod%inertia = new_rod_integrals(rod%length, spread(mass_per_length, 1, size(rule%points)), rule)
+         if (shortens) rod%shortening = new_shortening_integrals(rod%length, spread(mass_per_length, 1, size(rule%points)), rule)
       end if
       if (lumped) rod%inertia = rod_integrals()
    end subroutine integrate_mass
@@ -178,6 +188,10 @@ contains
          rod%m0_reduced = i%m0 - i%a1*rod%g(1) - i%b1*rod%g(2)
          rod%m1_reduced = i%m1 - i%sa*rod%g(1) - i%sb*rod%g(2)
          rod%m2_reduced = i%m2 - i%sa*rod%h(1) - i%sb*rod%h(2)
+      end associate
+      associate (d => rod%shortening%chord, e => rod%shortening%first)
+         rod%by_chord = reshape([solve_b(rod, d(1), d(2)), solve_b(rod, d(2), d(3))], [2, 2])
+         rod%by_first = reshape([solve_b(rod, e(1), e(2)), solve_b(rod, e(2), e(3))], [2, 2])
       end associate
    end subroutine reduce
 

@@ -1,11 +1,11 @@
 !> Shape functions of a rod and the inertia integrals over them, docs/model.md sec. 1 and 3.
 module rodyn_rod_integrals
    use rodyn_kinds, only: wp
-   use rodyn_quadrature, only: gauss_rule
+   use rodyn_quadrature, only: gauss_rule, new_gauss_rule
    implicit none (type, external)
    private
    public :: rod_integrals, new_rod_integrals, shape_alpha, shape_beta, curvature_alpha, curvature_beta
-   public :: bubble_stiffness
+   public :: bubble_stiffness, shortening_integrals, new_shortening_integrals
 
    !> Integrals over one rod, 0 <= s <= l; m(s) is its mass per length.
    type :: rod_integrals
@@ -25,6 +25,17 @@ module rodyn_rod_integrals
       real(wp) :: bc = 0.0_wp !! int m Nb Nc [kg m]
       real(wp) :: cc = 0.0_wp !! int m Nc^2 [kg]
    end type rod_integrals
+
+   !> Foreshortening of a rod whose arc keeps its length: a point at s moves towards the inner node by d(s) = x.D(s) x/2 with the
+   !> bending coordinates x and D(s) = int_0^s N' N'^T. Elements (1,1), (1,2), (2,2), (1,3), (2,3), (3,3) of symmetric matrices over
+   !> x; what belongs to the bubble has 1/m less for each of its indices.
+   type :: shortening_integrals
+      real(wp) :: chord(6) = 0.0_wp       !! D(l) [m]
+      real(wp) :: first(6) = 0.0_wp       !! E = int m D [kg m]
+      real(wp) :: second(6) = 0.0_wp      !! S = int m s D [kg m^2]
+      real(wp) :: across(3, 6) = 0.0_wp   !! int m N_a D_i [kg m^2]
+      real(wp) :: products(6, 6) = 0.0_wp !! int m D_i D_j [kg m^2]
+   end type shortening_integrals
 
 contains
 
@@ -48,6 +59,20 @@ contains
       real(wp), intent(in) :: length !! l [m]
       shape_bubble = 16.0_wp*((s/length)*(1.0_wp - s/length))**2
    end function shape_bubble
+
+   !> N' N'^T of the three shapes: (1,1), (1,2), (2,2), (1,3), (2,3), (3,3).
+   pure function slope_products(s, length) result(products)
+      real(wp), intent(in) :: s      !! arc length from the inner node [m]
+      real(wp), intent(in) :: length !! l [m]
+      real(wp) :: products(6)
+      real(wp) :: x, a, b, c
+
+      x = s/length
+      a = (1.0_wp - x)*(1.0_wp - 3.0_wp*x)
+      b = x*(3.0_wp*x - 2.0_wp)
+      c = 32.0_wp*x*(1.0_wp - x)*(1.0_wp - 2.0_wp*x)/length
+      products = [a*a, a*b, b*b, a*c, b*c, c*c]
+   end function slope_products
 
    !> Na'' = (6 s/l - 4)/l [1/m].
    elemental real(wp) function curvature_alpha(s, length)
@@ -101,6 +126,47 @@ contains
       integrals%bc = sum(dm*nb*nc)
       integrals%cc = sum(dm*nc**2)
    end function new_rod_integrals
+
+   !> Integrals of the foreshortening, with the mass per length at the points of a Gauss rule.
+   pure function new_shortening_integrals(length, mass_per_length, rule) result(integrals)
+      real(wp), intent(in) :: length             !! l [m]
+      real(wp), intent(in) :: mass_per_length(:) !! m at s = l*rule%points (points) [kg/m]
+      type(gauss_rule), intent(in) :: rule       !! on [0, 1]
+      type(shortening_integrals) :: integrals
+      type(gauss_rule) :: exact
+      real(wp) :: dm, s, d(6), shapes(3)
+      integer :: i, j
+
+      call new_gauss_rule(exact, 4) ! N' N'^T has degree 6
+      integrals%chord = shortening_up_to(length)
+      do i = 1, size(rule%points)
+         s = length*rule%points(i)
+         dm = length*rule%weights(i)*mass_per_length(i)
+         d = shortening_up_to(s)
+         shapes = [shape_alpha(s, length), shape_beta(s, length), shape_bubble(s, length)]
+         integrals%first = integrals%first + dm*d
+         integrals%second = integrals%second + dm*s*d
+         do j = 1, 6
+            integrals%across(:, j) = integrals%across(:, j) + dm*d(j)*shapes
+            integrals%products(:, j) = integrals%products(:, j) + dm*d(j)*d
+         end do
+      end do
+
+   contains
+
+      !> D(s).
+      pure function shortening_up_to(s) result(d)
+         real(wp), intent(in) :: s !! [m]
+         real(wp) :: d(6)
+         integer :: j
+
+         d = 0.0_wp
+         do j = 1, size(exact%points)
+            d = d + s*exact%weights(j)*slope_products(s*exact%points(j), length)
+         end do
+      end function shortening_up_to
+
+   end function new_shortening_integrals
 
    !> int EI N'' Nc'' for N = Na, Nb [N] and Nc [N/m], by a Gauss rule. A constant EI couples the bubble with nothing:
    !> integrated twice by parts, Nc'' against a linear function leaves only what Nc is at the ends.

@@ -37,6 +37,7 @@ module rodyn_scene
       logical :: lumped = .false.         !! all mass in the nodes
       logical :: condensed = .false.      !! quasistatic and not lumped: rods have mass where they bend without inertia of their own
       logical :: consistent = .true.      !! second-order inertia terms kept
+      logical :: inextensible = .false.   !! rods that bend as motion keep their arc, not their chord
       logical :: assembled = .false.      !! kernel: assembled instead of recursive
       type(spacecraft_body) :: body
       real(wp), allocatable :: node_mass(:)    !! (0:n) [kg]; node 0 and the halves of rods only when lumped
@@ -53,6 +54,8 @@ module rodyn_scene
       procedure :: beta_at
       procedure :: bend_at
       procedure :: bends
+      procedure :: chord
+      procedure :: chord_rate
       procedure :: rod
    end type scene_type
 
@@ -97,6 +100,30 @@ contains
       end do
    end function bends
 
+   !> Chord of rod k [m]: its length, less the foreshortening of a bent `inextensible` one.
+   pure real(wp) function chord(self, k, q)
+      class(scene_type), intent(in) :: self
+      integer, intent(in) :: k
+      real(wp), intent(in) :: q(:) !! (n_q) or (n_dof)
+      real(wp) :: x(most_shapes)
+
+      chord = self%rods(self%rod_of(k))%length
+      if (.not. self%inextensible) return
+      x = self%bends(k, q)
+      chord = chord - 0.5_wp*dot_product(x, matmul(self%bending(self%rod_of(k))%shortening, x))
+   end function chord
+
+   !> Rate of the chord [m/s].
+   pure real(wp) function chord_rate(self, k, q, p)
+      class(scene_type), intent(in) :: self
+      integer, intent(in) :: k
+      real(wp), intent(in) :: q(:), p(:)
+
+      chord_rate = 0.0_wp
+      if (self%inextensible) chord_rate = &
+         -dot_product(self%bends(k, q), matmul(self%bending(self%rod_of(k))%shortening, self%bends(k, p)))
+   end function chord_rate
+
    !> Constants of rod k.
    elemental function rod(self, k)
       class(scene_type), intent(in) :: self
@@ -129,7 +156,8 @@ contains
       scene%quasistatic = config%model%bending == 'quasistatic'
       scene%lumped = config%model%inertia == 'lumped'
       scene%condensed = scene%quasistatic .and. .not. scene%lumped
-      scene%consistent = config%model%formulation == 'consistent'
+      scene%consistent = config%model%formulation /= 'paper'
+      scene%inextensible = config%model%formulation == 'inextensible' .and. scene%dynamic_bending
       scene%assembled = config%model%kernel == 'assembled'
       scene%n_bend = merge(config%model%bending_shapes, 0, scene%dynamic_bending)
       scene%n_dof = scene%n_base + (1 + scene%n_bend)*scene%n
@@ -190,8 +218,8 @@ contains
       do j = 1, n_distinct
          associate (k => first(j), chain => config%chain)
             call new_rod_constants(rods(j), chain%length(k), chain%mass_per_length(k), stiffness_of(k), rule, &
-                                   scene%lumped, scene%dynamic_bending, scene%consistent, ok, &
-                                   profiles(profile_of(1, k)), profiles(profile_of(2, k)))
+                                   scene%lumped, scene%dynamic_bending, scene%consistent, ok, profiles(profile_of(1, k)), &
+                                   profiles(profile_of(2, k)), scene%inextensible)
             if (.not. ok) then
                write (number, '(i0)') k
                call raise(error, '&chain: rod '//trim(number)//' has no bending inertia or stiffness: dynamic bending needs '// &
