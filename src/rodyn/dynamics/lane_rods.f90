@@ -1,5 +1,5 @@
 !> Constants of rods side by side in vector lanes: the same rod of several scenes (`rodyn_lane_scene`), or several rods of one
-!> scene.
+!> scene. The same equations elsewhere: docs/model.md sec. 7.
 module rodyn_lane_rods
    use rodyn_kinds, only: wp
    use rodyn_lanes, only: lanes

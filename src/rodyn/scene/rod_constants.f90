@@ -143,7 +143,6 @@ contains
       if (is_varying(profile)) then
          finer = rule_for(profile, rule)
          rod%inertia = new_rod_integrals(rod%length, mass_per_length*profile%at(finer%points), finer)
-         if (shortens) rod%shortening = new_shortening_integrals(rod%length, mass_per_length*profile%at(finer%points), finer)
          associate (i => rod%inertia)
             rod%share = [i%m0 - i%m1/rod%length, i%m1/rod%length]
          end associate
@@ -151,10 +150,27 @@ contains
          rod%share = 0.5_wp*rod%length*mass_per_length
       else
          rod%inertia = new_rod_integrals(rod%length, spread(mass_per_length, 1, size(rule%points)), rule)
-         if (shortens) rod%shortening = new_shortening_integrals(rod%length, spread(mass_per_length, 1, size(rule%points)), rule)
       end if
       if (lumped) rod%inertia = rod_integrals()
+      if (shortens) call integrate_shortening(rod, mass_per_length, size(rule%points) + 4, profile)
    end subroutine integrate_mass
+
+   !> Integrals of the foreshortening. Those of d^2 have eight degrees more than those of v^2.
+   pure subroutine integrate_shortening(rod, mass_per_length, n_points, profile)
+      type(rod_constants), intent(inout) :: rod
+      real(wp), intent(in) :: mass_per_length
+      integer, intent(in) :: n_points
+      type(rod_profile), intent(in), optional :: profile
+      type(gauss_rule) :: rule
+
+      call new_gauss_rule(rule, n_points)
+      if (is_varying(profile)) then
+         rule = rule_for(profile, rule)
+         rod%shortening = new_shortening_integrals(rod%length, mass_per_length*profile%at(rule%points), rule)
+      else
+         rod%shortening = new_shortening_integrals(rod%length, spread(mass_per_length, 1, n_points), rule)
+      end if
+   end subroutine integrate_shortening
 
    pure logical function is_varying(profile)
       type(rod_profile), intent(in), optional :: profile
