@@ -292,7 +292,7 @@ contains
       call visitor%word_field(model%inertia, key('inertia', words='distributed|lumped', &
          help='mass along the rods, or half of it at each of their ends'))
       call visitor%word_field(model%bending, key('bending', words='dynamic|quasistatic|rigid', &
-         help="dynamic needs inertia = 'distributed'; quasistatic: rods bend by statics, with mass if 'distributed'"))
+         help="dynamic needs inertia = 'distributed'; quasistatic: by statics, with mass if 'distributed'"))
       call visitor%field(model%bending_shapes, key('bending_shapes', rule=in_range, low=2.0_wp, high=3.0_wp, &
          help="of a rod, bending = 'dynamic': 2 are its end slopes; 3 adds a bubble between (gauss_points >= 5)"))
       call visitor%word_field(model%dampers, key('dampers', words='reduced|exact', &
