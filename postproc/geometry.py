@@ -35,11 +35,14 @@ class Place:
     def __init__(self, run: Run):
         self.hinge = np.array([run.number("spacecraft", "hinge_x", 0.0), run.number("spacecraft", "hinge_y", 0.0)])
         self.length = run.per_rod("length")
+        self.keeps_arc = run.group("model").get("formulation") == "inextensible" and run.group("model").get("bending") == "dynamic"
         self.outline = body_outline(run)
 
     def shape(self, state: dict[str, np.ndarray], frame: str, magnification: float = 1.0, time: float = 0.0) -> Shape:
         """The configuration of a state: phi, alpha, beta (and bubble) of all rods; displacement and rotation of the spacecraft."""
-        nodes, rods = chain(self.hinge, self.length, state["phi"], state["alpha"], state["beta"], magnification, state.get("bubble", 0.0))
+        length, bent = self.length, (state["alpha"], state["beta"], state.get("bubble", 0.0))
+        chord = length - foreshortening(length, *bent) if self.keeps_arc else length
+        nodes, rods = chain(self.hinge, length, state["phi"], *bent[:2], magnification, bent[2], chord)
         shape = Shape(time, np.zeros(2), self.outline, nodes, rods)
         if frame == "moving":
             return shape
@@ -47,14 +50,15 @@ class Place:
 
 
 def chain(hinge: np.ndarray, length: np.ndarray, phi: np.ndarray, alpha: np.ndarray, beta: np.ndarray,
-          magnification: float, bubble: np.ndarray | float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes r_k = r_{k-1} + l e_k, and points r_{k-1} + s e_k + v n_k with v = Na alpha + Nb beta + Nc bubble."""
+          magnification: float, bubble: np.ndarray | float = 0.0, chord: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes r_k = r_{k-1} + chord e_k, and points r_{k-1} + s e_k + v n_k with v = Na alpha + Nb beta + Nc bubble."""
+    chord = length if chord is None else chord
     along = np.stack([np.cos(phi), np.sin(phi)], axis=-1)
     across = np.stack([-along[:, 1], along[:, 0]], axis=-1)
-    nodes = np.concatenate([hinge[None], hinge + np.cumsum(length[:, None] * along, axis=0)])
+    nodes = np.concatenate([hinge[None], hinge + np.cumsum(chord[:, None] * along, axis=0)])
     x = np.linspace(0.0, 1.0, POINTS)
     v = magnification * deflection(length, alpha, beta, x, bubble)
-    rods = nodes[:-1, None] + (length[:, None] * x)[..., None] * along[:, None] + v[..., None] * across[:, None]
+    rods = nodes[:-1, None] + (chord[:, None] * x)[..., None] * along[:, None] + v[..., None] * across[:, None]
     return nodes, rods
 
 
@@ -63,6 +67,15 @@ def deflection(length: np.ndarray, alpha: np.ndarray, beta: np.ndarray, x: np.nd
     """v at s = x l of each rod, (..., n, points)."""
     na, nb, nc = x * (1 - x) ** 2, -(x**2) * (1 - x), 16 * (x * (1 - x)) ** 2
     return length[..., None] * (na * alpha[..., None] + nb * beta[..., None]) + nc * np.asarray(bubble)[..., None]
+
+
+def foreshortening(length: np.ndarray, alpha: np.ndarray, beta: np.ndarray, bubble: np.ndarray | float = 0.0) -> np.ndarray:
+    """int v'^2/2 over each rod, by which its chord is shorter than its arc, [m]."""
+    x, weight = np.polynomial.legendre.leggauss(4)
+    x = (x + 1) / 2
+    slope = ((1 - x) * (1 - 3 * x) * alpha[..., None] + x * (3 * x - 2) * beta[..., None]
+             + 32 * x * (1 - x) * (1 - 2 * x) * (np.asarray(bubble) / length)[..., None])
+    return length / 4 * (slope**2 @ weight)
 
 
 def bubbles(run: Run, rows: np.ndarray | int) -> np.ndarray:

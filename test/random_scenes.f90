@@ -54,6 +54,7 @@ contains
    subroutine set_kind(config, which)
       type(case_config), intent(inout) :: config
       integer, intent(in) :: which
+      config%model%formulation = 'consistent'
       if (which > n_kinds) then
          config%spacecraft%motion = merge('free ', 'fixed', which == n_kinds + 1)
          config%model%formulation = 'consistent'
@@ -98,11 +99,12 @@ contains
       end select
    end subroutine set_kind
 
-   !> Arrays of a case with n rods, zero where zero is a sensible default.
+   !> Arrays of a case with n rods, zero where zero is a sensible default. Chords keep their length.
    subroutine allocate_case(config, n)
       type(case_config), intent(inout) :: config
       integer, intent(in) :: n
       config%chain%n_rods = n
+      config%model%formulation = 'consistent'
       allocate (config%chain%length(n), config%chain%mass_per_length(n), config%chain%bending_stiffness(n), &
                 config%chain%node_mass(n), config%chain%hinge_stiffness(0:n - 1), config%chain%hinge_damping(0:n - 1), &
                 config%chain%kink(0:n - 1), config%initial%phi(n), config%initial%alpha(n), config%initial%beta(n), &
@@ -118,8 +120,8 @@ contains
       integer, intent(in) :: which, n
       integer :: k
 
-      call set_kind(config, which)
       call allocate_case(config, n)
+      call set_kind(config, which)
       config%spacecraft%mass = uniform(1.0_wp, 200.0_wp)
       config%spacecraft%inertia = uniform(0.5_wp, 50.0_wp)
       config%spacecraft%hinge_x = uniform(-1.0_wp, 1.0_wp)

@@ -62,7 +62,7 @@ module rodyn_case_config
 
    !> &model
    type :: model_config
-      character(len=name_length) :: formulation = 'consistent' !! 'consistent' or 'paper'
+      character(len=name_length) :: formulation = 'inextensible' !! 'inextensible', 'consistent' or 'paper'
       character(len=name_length) :: inertia = 'distributed'    !! 'distributed' or 'lumped'
       character(len=name_length) :: bending = 'dynamic'        !! 'dynamic', 'quasistatic' or 'rigid'
       integer :: bending_shapes = 2                            !! shapes of a rod that bends as motion: 2, or 3 with the bubble

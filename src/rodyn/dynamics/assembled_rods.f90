@@ -1,5 +1,5 @@
-!> M(q) and the forces of a chain of rods by their maps, docs/model.md sec. 3 and 4.1: M = sum_k J_k^T m_k J_k with J_k from p' to the
-!> accelerations (A, W', x'') of rod k. O(n^3).
+!> M(q) and the forces of a chain of rods by their maps, docs/model.md sec. 3 and 4.1: M = sum_k J_k^T m_k J_k with J_k
+!> from p' to the accelerations (A, W', x'') of rod k. O(n^3).
 !>
 !> For rods whose arcs keep their length, which have no place in the article's N(q) z. It shares the rod's own rows (`rod_alone`,
 !> `shorten`) with the recursion through joints, and nothing with `rodyn_recursion_inextensible`.
@@ -18,7 +18,7 @@ module rodyn_assembled_rods
 
 contains
 
-   !> M, and the forces of inertia at p' = 0 and of loads on nodes; without hinges, the stiffness of rods and loads on the spacecraft.
+   !> M, and the forces of inertia at p' = 0 and of loads on nodes; without hinges, stiffness of rods, loads on the spacecraft.
    subroutine sum_rods(scene, sine, cosine, q, p, loaded, node_force, m, force)
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: sine(0:), cosine(0:) !! of phi (0:n)

@@ -76,6 +76,7 @@ contains
       rigid = scene
       if (.not. scene%dynamic_bending) return
       rigid%dynamic_bending = .false.
+      rigid%inextensible = .false.
       rigid%n_bend = 0
       rigid%n_dof = scene%n_base + scene%n
       rigid%n_q = rigid%n_dof

@@ -13,8 +13,8 @@ module rodyn_lane_recursion_inextensible
    private
    public :: lane_inextensible_accelerations
 
-   !> What the inward pass leaves of a rod for the outward pass: W', f_e and the acceleration of the outer node at A = 0 and by A along
-   !> and across the rod, and the turn from the axes of rod k - 1.
+   !> What the inward pass leaves of a rod for the outward pass: W', f_e and the acceleration of the outer node at A = 0 and by A
+   !> along and across the rod, and the turn from the axes of rod k - 1.
    type, public :: lane_outward
       real(wp), dimension(lanes) :: turn, ce, cn, cd, sd, pull_0, pull_e, pull_n, along_0, along_e, along_n
    end type lane_outward

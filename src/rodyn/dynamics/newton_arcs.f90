@@ -1,9 +1,10 @@
 !> Newton systems in O(n) of chains whose rods keep their arcs: `rodyn_newton_chain` with rods that draw their outer nodes in.
 !>
 !> Unknowns, hinges and elimination are those of that module. A rod's rows (f_e, f_n, phi, alpha, beta) are
-!>     m (dA, W', alpha'', beta'') + g (dW, dalpha', dbeta') + k (dphi, dalpha, dbeta) + J^T (change of the force on the outer node),
+!>     m (dA, W', alpha'', beta'') + g (dW, dalpha', dbeta') + k (dphi, dalpha, dbeta) + J^T (change of force on the outer node),
 !> and its outer node accelerates by dA + J (W', alpha'', beta'') + g_o (...) + k_o (...). All of these are small matrices, found by
-!> derivatives of the rod in one direction after the other (`differentiate_rod`). The same equations elsewhere: docs/model.md sec. 7.
+!> derivatives of the rod in one direction after the other (`differentiate_rod`).
+!> The same equations elsewhere: docs/model.md sec. 7.
 module rodyn_newton_arcs
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use rodyn_kinds, only: wp
@@ -190,8 +191,8 @@ contains
       by(:, 2:) = t%outer_mass + gamma*(t%outer_gyration + gamma*t%outer_stiffness)
    end function moved
 
-   !> Rows fe, fn, t, alpha, beta of one rod with the chain beyond it; columns dAe, dAn, w', t, alpha, beta with phi = t - alpha. The
-   !> hinges' moments are those of the outer hinge; T_{k-1} is left out.
+   !> Rows fe, fn, t, alpha, beta of one rod with the chain beyond it; columns dAe, dAn, w', t, alpha, beta with phi = t - alpha.
+   !> The hinges' moments are those of the outer hinge; T_{k-1} is left out.
    pure subroutine rod_equations(t, gamma, p, pw, q)
       type(arc_tangent), intent(in) :: t
       real(wp), intent(in) :: gamma

@@ -1,6 +1,6 @@
 !> Accelerations in O(n) of a chain of flexible rods whose arcs keep their length, docs/model.md sec. 3 and 4.2.
 !>
-!> As in `rodyn_recursion_flexible` the chain from rod k outward is, seen from its inner node, an apparent mass P and a bias force b.
+!> As in `rodyn_recursion_flexible` the chain from rod k outward is, seen from its inner node, an apparent mass P and a bias b.
 !> A bent rod draws its outer node in, so the force f_e that the chain beyond puts on the rod along it bends the rod as well, and
 !> the outer node yields to it by a mobility (`rodyn_inextensible_rods`): the chain beyond is lighter along the rod,
 !>     P~ = P - P e (mobility/(1 + mobility pee)) e P,   b~ alike.
@@ -20,8 +20,8 @@ module rodyn_recursion_inextensible
    private
    public :: inextensible_recursion, new_inextensible_recursion, inextensible_accelerations
 
-   ! Places in `outward` (`rodyn_outboard_chain`): W', f_e and the acceleration of the outer node as they are at A = 0 and by A along
-   ! and across the rod, and the turn from the axes of rod k - 1.
+   ! Places in `outward` (`rodyn_outboard_chain`): W', f_e and the acceleration of the outer node as they are at A = 0 and by A
+   ! along and across the rod, and the turn from the axes of rod k - 1.
    integer, parameter :: of_turn = 1, of_pull = 7, of_along = 13, of_across = 19, of_cosine = 25, of_sine = 27, outward_size = 27
 
    !> Memory. Rods stand in groups of `lanes`, from hinge 0 on. One per thread.

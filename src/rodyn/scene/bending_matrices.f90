@@ -16,7 +16,7 @@ module rodyn_bending_matrices
       real(wp) :: first(most_shapes) = 0.0_wp            !! int m N [kg m]
       real(wp) :: turning(most_shapes) = 0.0_wp          !! int m s N [kg m^2]
       real(wp) :: inertia(most_shapes, most_shapes) = 0.0_wp   !! B = int m N N^T [kg m^2]
-      real(wp) :: second(most_shapes, most_shapes) = 0.0_wp    !! of second order in int m |r|^2: B; B - S if `inextensible`; zero in `paper`
+      real(wp) :: second(most_shapes, most_shapes) = 0.0_wp    !! in int m |r|^2: B; B - S if `inextensible`; 0 in `paper`
       real(wp) :: centrifugal(most_shapes, most_shapes) = 0.0_wp !! W^2 on x: B; B - S if `inextensible` [kg m^2]
       real(wp) :: shortening(most_shapes, most_shapes) = 0.0_wp  !! D(l) of the foreshortening (`rodyn_rod_integrals`) [m]
       real(wp) :: drawn(most_shapes, most_shapes) = 0.0_wp     !! E = int m D [kg m]
