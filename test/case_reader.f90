@@ -90,7 +90,7 @@ contains
       if (allocated(error)) return
       call check(error, trim(config%spacecraft%motion)//' '//trim(config%model%formulation)//' ' &
          //trim(config%model%inertia)//' '//trim(config%model%bending)//' '//trim(config%model%kernel)//' ' &
-         //trim(config%solver%method), 'free consistent distributed dynamic recursive auto', 'words')
+         //trim(config%solver%method), 'free inextensible distributed dynamic recursive auto', 'words')
       if (allocated(error)) return
       call check(error, config%output%ledger .and. len(config%title) == 0 .and. len(config%output%file) == 0, 'output')
    end subroutine defaults_apply
