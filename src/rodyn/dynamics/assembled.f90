@@ -13,7 +13,7 @@ module rodyn_assembled
    use rodyn_hinge_law, only: hinge_law
    use rodyn_bending_matrices, only: most_shapes
    use rodyn_condensed, only: whole_scene, whole_state, expand_slopes
-   use rodyn_assembled_rods, only: sum_rods
+   use rodyn_assembled_rods, only: n_map_rows, sum_rods
    use rodyn_locks, only: has_slaves, reduce, expand, reduce_matrix, reactions
    use rodyn_lapack, only: dpotrf, dpotrs, dgesv, dgemv
    use rodyn_text, only: formatted
@@ -30,6 +30,7 @@ module rodyn_assembled
       real(wp), allocatable :: n(:, :)  !! N (dof, size of z)
       real(wp), allocatable :: z(:)     !! z
       real(wp), allocatable :: row(:)   !! row of w of M (dof)
+      real(wp), allocatable :: maps(:, :) !! memory of `sum_rods`, `inextensible` only
       real(wp), allocatable :: static(:, :) !! S_k, first moment outboard (2, n) [kg m]
       real(wp), allocatable :: axial(:, :)  !! X_k, the same turned by -90 degrees (2, n) [kg m]
       real(wp), allocatable :: outboard(:)  !! mass beyond rod k (0:n) [kg]
@@ -61,6 +62,7 @@ contains
                 system%z(n_whole), system%row(n_whole), system%q2(n_dof), &
                 system%static(2, n), system%axial(2, n), system%outboard(0:n), &
                 b(0:n - 1, n_dof), c(0:n - 1, n_dof), r(0:n - 1, n_dof), stat=status)
+      if (status == 0 .and. scene%inextensible) allocate (system%maps(n_map_rows, n_dof), stat=status)
       if (status /= 0) then
          call raise(error, "kernel = 'assembled' needs "//formatted(4.75_wp*8.0_wp*real(n_dof, wp)**2/1024.0_wp**3, '(f0.1)')// &
                     " GiB for this scene; use 'recursive'")
@@ -235,7 +237,7 @@ contains
       real(wp), intent(out) :: force(:) !! (dof)
 
       if (scene%inextensible) then
-         call sum_rods(scene, sine, cosine, q, p, loaded, node_force, system%m, force)
+         call sum_rods(scene, sine, cosine, q, p, loaded, node_force, system%maps, system%m, force)
          if (scene%n_base > 0) force(1:3) = force(1:3) + base_force
          return
       end if
@@ -409,11 +411,12 @@ contains
       real(wp), intent(in) :: sine(0:), cosine(0:) !! of phi (0:n)
       real(wp), intent(in) :: q(:)                 !! coordinates (dof)
       integer :: i, j, k, fj, fk
+      real(wp), parameter :: nowhere(2, 1) = 0.0_wp
       real(wp) :: mvv, normal(2), along, x(most_shapes), curved(most_shapes)
 
       if (scene%inextensible) then
          system%z = 0.0_wp
-         call sum_rods(scene, sine, cosine, q, system%z, .false., reshape([real(wp) ::], [2, 0]), system%m, system%row)
+         call sum_rods(scene, sine, cosine, q, system%z, .false., nowhere, system%maps, system%m, system%row)
          return
       end if
       associate (m => system%m, n => scene%n)

@@ -23,6 +23,7 @@ module rodyn_newton_arcs
    !> A rod at a state, in its axes. Rows f_e, f_n, phi, alpha, beta; columns (W', alpha'', beta'') and so on.
    type :: arc_tangent
       real(wp) :: cd = 1.0_wp, sd = 0.0_wp !! cosine and sine of the turn from the axes of rod k - 1
+      real(wp) :: inner(2), outer(2)       !! acceleration of the inner and the outer node
       real(wp) :: mass(5, 5), gyration(5, 3), stiffness(5, 3) !! stiffness with that of the force on the outer node
       real(wp) :: outer_mass(2, 3), outer_gyration(2, 3), outer_stiffness(2, 3) !! by which the outer node is moved
    end type arc_tangent
@@ -38,17 +39,17 @@ contains
       logical, intent(in) :: loaded                !! node_force is to be used
       real(wp), intent(in) :: node_force(:, :)     !! X, Y at the nodes (2, n) [N]
       type(arc_tangent), intent(inout) :: tangent(:) !! (n)
-      real(wp) :: inner(2, scene%n), outer(2, scene%n), force(2), own(2)
+      real(wp) :: force(2), own(2)
       integer :: k
 
-      call accelerate_nodes(scene, sine, cosine, q, p, a, tangent, inner, outer)
+      call accelerate_nodes(scene, sine, cosine, q, p, a, tangent)
       force = 0.0_wp
       do k = scene%n, 1, -1
          associate (t => tangent(k))
-            force = force + scene%node_mass(k)*outer(:, k)
+            force = force + scene%node_mass(k)*t%outer
             if (loaded) force = force - [node_force(1, k)*cosine(k) + node_force(2, k)*sine(k), &
                                          node_force(2, k)*cosine(k) - node_force(1, k)*sine(k)]
-            call linearise_rod(scene, k, q, p, a, inner(:, k), outer(:, k) - inner(:, k), force, t, own)
+            call linearise_rod(scene, k, q, p, a, force, t, own)
             force = force + own
             force = [t%cd*force(1) - t%sd*force(2), t%sd*force(1) + t%cd*force(2)]
          end associate
@@ -56,11 +57,10 @@ contains
    end subroutine linearise_arcs
 
    !> Accelerations of the inner and the outer node of each rod, in its axes.
-   pure subroutine accelerate_nodes(scene, sine, cosine, q, p, a, tangent, inner, outer)
+   pure subroutine accelerate_nodes(scene, sine, cosine, q, p, a, tangent)
       type(scene_type), intent(in) :: scene
       real(wp), intent(in) :: sine(0:), cosine(0:), q(:), p(:), a(:)
       type(arc_tangent), intent(inout) :: tangent(:)
-      real(wp), intent(out) :: inner(:, :), outer(:, :)
       real(wp) :: node(2), w, wr, u(most_shapes)
       integer :: k
 
@@ -76,11 +76,11 @@ contains
          associate (t => tangent(k), shortening => scene%bending(scene%rod_of(k))%shortening)
             t%cd = cosine(k)*cosine(k - 1) + sine(k)*sine(k - 1)
             t%sd = sine(k)*cosine(k - 1) - cosine(k)*sine(k - 1)
-            inner(:, k) = [t%cd*node(1) + t%sd*node(2), t%cd*node(2) - t%sd*node(1)]
-            outer(:, k) = inner(:, k) + scene%chord(k, q)*[-w**2, wr] + &
+            t%inner = [t%cd*node(1) + t%sd*node(2), t%cd*node(2) - t%sd*node(1)]
+            t%outer = t%inner + scene%chord(k, q)*[-w**2, wr] + &
                           [-dot_product(matmul(shortening, scene%bends(k, q)), scene%bends(k, a)) - &
                            dot_product(u, matmul(shortening, u)), 2.0_wp*w*scene%chord_rate(k, q, p)]
-            node = outer(:, k)
+            node = t%outer
          end associate
       end do
    end subroutine accelerate_nodes
@@ -100,18 +100,19 @@ contains
    end subroutine turning
 
    !> Matrices of one rod, and its own force on the inner node.
-   pure subroutine linearise_rod(scene, k, q, p, a, inner, carried, force, t, own)
+   pure subroutine linearise_rod(scene, k, q, p, a, force, t, own)
       type(scene_type), intent(in) :: scene
       integer, intent(in) :: k
       real(wp), intent(in) :: q(:), p(:), a(:)
-      real(wp), intent(in) :: inner(2), carried(2) !! acceleration of the inner node, and of the outer one against it
       real(wp), intent(in) :: force(2)             !! on the outer node
       type(arc_tangent), intent(inout) :: t
       real(wp), intent(out) :: own(2)
       real(wp), dimension(most_shapes) :: x, u, acc, dx, du, slope, slope_rate, slope_acc
-      real(wp) :: change(most), h(most, most), c(most), w, wr
+      real(wp) :: change(most), h(most, most), c(most), w, wr, inner(2), carried(2)
       integer :: j
 
+      inner = t%inner
+      carried = t%outer - t%inner
       x = scene%bends(k, q)
       u = scene%bends(k, p)
       acc = scene%bends(k, a)
@@ -266,7 +267,7 @@ contains
       real(wp), intent(in) :: omega_rate            !! change of w'
       real(wp), intent(in) :: hinge_acceleration(2) !! dA of hinge 0, moving axes
       real(wp), intent(inout) :: left(3, n)         !! in: from reduce_arcs; out: x of phi, alpha, beta
-      real(wp) :: node(2), tau
+      real(wp) :: node(2), tau, moving(4), by(2, 4), dq(3), dp(3)
       integer :: k
 
       node = hinge_acceleration
@@ -275,11 +276,15 @@ contains
          associate (t => tangent(k), f => factor(k))
             node = [t%cd*node(1) + t%sd*node(2), t%cd*node(2) - t%sd*node(1)]
             left(1, k) = left(1, k) + f%turn_hinge*tau - dot_product(f%turn, [node, omega_rate])
-            left(2:3, k) = left(2:3, k) - matmul(f%slope, [node, omega_rate, left(1, k)])
+            moving = [node, omega_rate, left(1, k)]
+            left(2:3, k) = left(2:3, k) - matmul(f%slope, moving)
             left(1, k) = left(1, k) - left(2, k)
             tau = left(1, k) + left(3, k)
-            node = node + matmul(t%outer_gyration, [d_omega + phi_rate(k), alpha_rate(k), beta_rate(k)]) + &
-                   matmul(t%outer_stiffness, [phi(k), alpha(k), beta(k)]) + matmul(moved(t, gamma), [omega_rate, left(:, k)])
+            moving = [omega_rate, left(:, k)]
+            by = moved(t, gamma)
+            dq = [phi(k), alpha(k), beta(k)]
+            dp = [d_omega + phi_rate(k), alpha_rate(k), beta_rate(k)]
+            node = node + matmul(t%outer_gyration, dp) + matmul(t%outer_stiffness, dq) + matmul(by, moving)
          end associate
       end do
    end subroutine expand_arcs

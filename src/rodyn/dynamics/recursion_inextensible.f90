@@ -54,9 +54,9 @@ contains
                                          acceleration, ok)
       type(inextensible_recursion), intent(inout) :: recursion
       type(scene_type), intent(in) :: scene
-      real(wp), intent(in) :: sine(0:), cosine(0:) !! of phi (0:n); 0 and 1 at k = 0
+      real(wp), intent(in) :: sine(0:scene%n), cosine(0:scene%n) !! of phi; 0 and 1 at k = 0
       real(wp), intent(in) :: q(*), p(*)           !! coordinates and rates
-      real(wp), intent(in) :: moment(0:)           !! T (0:n) [N m], T(n) = 0
+      real(wp), intent(in) :: moment(0:scene%n)    !! T [N m], T(n) = 0
       real(wp), intent(in) :: base_force(3)        !! X_C, Y_C, M_C, moving axes
       logical, intent(in) :: loaded                !! node_force is to be used
       real(wp), intent(in) :: node_force(2, *)     !! X, Y at nodes (n), moving axes [N]

@@ -20,12 +20,14 @@ contains
       real(wp), intent(in) :: x(most_shapes), y(most_shapes)
       real(wp) :: q(most_shapes, most_shapes)
       real(wp) :: half(6)
-      integer :: j, k
+      integer :: i, j, k
 
       do k = 1, most_shapes
-         half = matmul(bending%products(:, at(:, k)), y)
+         do i = 1, 6 ! element by element: vector subscripts would take memory at each call
+            half(i) = bending%products(i, at(1, k))*y(1) + bending%products(i, at(2, k))*y(2) + bending%products(i, at(3, k))*y(3)
+         end do
          do j = 1, most_shapes
-            q(j, k) = dot_product(half(at(:, j)), x)
+            q(j, k) = half(at(1, j))*x(1) + half(at(2, j))*x(2) + half(at(3, j))*x(3)
          end do
       end do
    end function axial_inertia
@@ -38,7 +40,7 @@ contains
       integer :: j
 
       do j = 1, most_shapes
-         z(:, j) = matmul(bending%across(:, at(:, j)), x)
+         z(:, j) = bending%across(:, at(1, j))*x(1) + bending%across(:, at(2, j))*x(2) + bending%across(:, at(3, j))*x(3)
       end do
    end function crossed_inertia
 
@@ -50,20 +52,20 @@ contains
       real(wp), intent(inout) :: h(3 + most_shapes, 3 + most_shapes), c(3 + most_shapes)
       real(wp) :: z(most_shapes, most_shapes), q(most_shapes, most_shapes), drawn(most_shapes), carried(most_shapes), moment
 
-      drawn = matmul(bending%drawn, x)
+      drawn = times(bending%drawn, x)
       moment = 0.5_wp*dot_product(x, drawn)
       z = crossed_inertia(bending, x)
       q = axial_inertia(bending, x, x)
-      carried = matmul(q, x)
+      carried = times(q, x)
       h(1, 4:) = h(1, 4:) - drawn
       h(2, 3) = h(2, 3) - moment
       h(3, 3) = h(3, 3) + 0.25_wp*dot_product(x, carried)
-      h(3, 4:) = h(3, 4:) + matmul(x, z) - 0.5_wp*matmul(z, x)
+      h(3, 4:) = h(3, 4:) + row_times(x, z) - 0.5_wp*times(z, x)
       h(4:, 4:) = h(4:, 4:) + q
-      c(1) = c(1) + w**2*moment - dot_product(u, matmul(bending%drawn, u))
+      c(1) = c(1) + w**2*moment - dot_product(u, times(bending%drawn, u))
       c(2) = c(2) - 2.0_wp*w*dot_product(u, drawn)
-      c(3) = c(3) + w*dot_product(u, carried) + dot_product(x, matmul(crossed_inertia(bending, u), u))
-      c(4:) = c(4:) - 0.5_wp*w**2*carried + 2.0_wp*w*(matmul(u, z) - matmul(z, u)) + matmul(axial_inertia(bending, x, u), u)
+      c(3) = c(3) + w*dot_product(u, carried) + dot_product(x, times(crossed_inertia(bending, u), u))
+      c(4:) = c(4:) - 0.5_wp*w**2*carried + 2.0_wp*w*(row_times(u, z) - times(z, u)) + times(axial_inertia(bending, x, u), u)
    end subroutine shorten
 
    !> What foreshortening adds to the change of a rod's own forces (f_e, f_n, row of W, rows of x), in the axes of the rod, in a
@@ -79,8 +81,8 @@ contains
       real(wp), dimension(most_shapes) :: drawn, d_drawn, d_turning
       real(wp) :: moment, d_moment
 
-      drawn = matmul(bending%drawn, x)
-      d_drawn = matmul(bending%drawn, dx)
+      drawn = times(bending%drawn, x)
+      d_drawn = times(bending%drawn, dx)
       moment = 0.5_wp*dot_product(x, drawn)
       d_moment = dot_product(drawn, dx)
       z = crossed_inertia(bending, x)
@@ -90,20 +92,34 @@ contains
       dq = axial_inertia(bending, x, dx)
       dq = dq + transpose(dq)
       xu = axial_inertia(bending, x, u)
-      d_turning = matmul(x, dz) + matmul(dx, z) - 0.5_wp*(matmul(dz, x) + matmul(z, dx))
+      d_turning = row_times(x, dz) + row_times(dx, z) - 0.5_wp*(times(dz, x) + times(z, dx))
       change(1) = change(1) - dot_product(d_drawn, acceleration) + 2.0_wp*w*dw*moment + w**2*d_moment - &
-                  2.0_wp*dot_product(du, matmul(bending%drawn, u))
+                  2.0_wp*dot_product(du, times(bending%drawn, u))
       change(2) = change(2) - w_rate*d_moment - 2.0_wp*(dw*dot_product(u, drawn) + w*(dot_product(du, drawn) + &
                                                                                     dot_product(u, d_drawn)))
-      change(3) = change(3) - d_moment*an - moment*d_an + w_rate*dot_product(x, matmul(q, dx)) + &
-                  dot_product(d_turning, acceleration) + dw*dot_product(x, matmul(q, u)) + &
-                  w*(dot_product(matmul(q, dx) + matmul(dq, x), u) + dot_product(x, matmul(q, du))) + &
-                  dot_product(dx, matmul(uz, u)) + 2.0_wp*dot_product(x, matmul(uz, du))
-      change(4:) = change(4:) - d_drawn*ae - drawn*d_ae + w_rate*d_turning + matmul(dq, acceleration) - &
-                   w*dw*matmul(q, x) - 0.5_wp*w**2*(matmul(dq, x) + matmul(q, dx)) + &
-                   2.0_wp*dw*(matmul(u, z) - matmul(z, u)) + &
-                   2.0_wp*w*(matmul(du, z) - matmul(z, du) + matmul(u, dz) - matmul(dz, u)) + &
-                   matmul(axial_inertia(bending, dx, u), u) + 2.0_wp*matmul(xu, du)
+      change(3) = change(3) - d_moment*an - moment*d_an + w_rate*dot_product(x, times(q, dx)) + &
+                  dot_product(d_turning, acceleration) + dw*dot_product(x, times(q, u)) + &
+                  w*(dot_product(times(q, dx) + times(dq, x), u) + dot_product(x, times(q, du))) + &
+                  dot_product(dx, times(uz, u)) + 2.0_wp*dot_product(x, times(uz, du))
+      change(4:) = change(4:) - d_drawn*ae - drawn*d_ae + w_rate*d_turning + times(dq, acceleration) - &
+                   w*dw*times(q, x) - 0.5_wp*w**2*(times(dq, x) + times(q, dx)) + &
+                   2.0_wp*dw*(row_times(u, z) - times(z, u)) + &
+                   2.0_wp*w*(row_times(du, z) - times(z, du) + row_times(u, dz) - times(dz, u)) + &
+                   times(axial_inertia(bending, dx, u), u) + 2.0_wp*times(xu, du)
    end subroutine shorten_tangent
+
+   !> Matrix times vector. (Where products are arguments of others, the intrinsic takes memory at each call.)
+   pure function times(matrix, vector) result(values)
+      real(wp), intent(in) :: matrix(most_shapes, most_shapes), vector(most_shapes)
+      real(wp) :: values(most_shapes)
+      values = matrix(:, 1)*vector(1) + matrix(:, 2)*vector(2) + matrix(:, 3)*vector(3)
+   end function times
+
+   !> Vector times matrix.
+   pure function row_times(vector, matrix) result(values)
+      real(wp), intent(in) :: vector(most_shapes), matrix(most_shapes, most_shapes)
+      real(wp) :: values(most_shapes)
+      values = vector(1)*matrix(1, :) + vector(2)*matrix(2, :) + vector(3)*matrix(3, :)
+   end function row_times
 
 end module rodyn_foreshortening
