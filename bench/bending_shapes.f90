@@ -48,6 +48,7 @@ contains
 
       c%title = ''
       c%spacecraft%motion = 'fixed'
+      c%model%formulation = 'consistent'
       c%model%bending_shapes = shapes
       c%model%gauss_points = 5
       c%chain%n_rods = n

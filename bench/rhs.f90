@@ -28,12 +28,15 @@ program bench_rhs
    type(case_config) :: config
    integer :: i, round
 
-   allocate (subjects(31))
+   allocate (subjects(32))
    i = 0
    call add('n = 4, consistent, recursive', standard(4))
    config = standard(4)
    config%model%kernel = 'assembled'
    call add('n = 4, consistent, assembled', config)
+   config = standard(4)
+   config%model%formulation = 'inextensible'
+   call add('n = 4, inextensible, recursive', config)
    config = standard(4)
    config%model%formulation = 'paper'
    call add('n = 4, paper', config)

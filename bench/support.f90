@@ -23,6 +23,7 @@ contains
       integer, intent(in) :: n
 
       c%title = ''
+      c%model%formulation = 'consistent'
       c%spacecraft%mass = 122.5_wp
       c%spacecraft%inertia = 122.5_wp*0.98_wp/12.0_wp
       c%spacecraft%hinge_x = 0.35_wp

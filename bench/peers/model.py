@@ -63,7 +63,7 @@ def read_scene(path: str, hinge_factor: float = 1.0, number: type = float) -> Sc
     groups = read_namelist(pathlib.Path(path).read_text())
     case, craft, chain = (groups[name][0] for name in ("case", "spacecraft", "chain"))
     model = groups.get("model", [{}])[0]
-    if model.get("formulation", "consistent") != "consistent":
+    if model.get("bending", "dynamic") == "dynamic" and model.get("formulation", "inextensible") != "consistent":
         raise ValueError("peers know the consistent formulation only")
     n = chain["n_rods"]
 

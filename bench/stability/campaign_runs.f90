@@ -154,6 +154,7 @@ contains
       type(case_config), intent(out) :: config
       integer, intent(in) :: n
       config%title = ''
+      config%model%formulation = 'consistent'
       config%chain%n_rods = n
       associate (chain => config%chain, initial => config%initial)
          allocate (chain%length(n), chain%mass_per_length(n), chain%bending_stiffness(n), chain%node_mass(n), &
