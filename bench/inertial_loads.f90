@@ -1,6 +1,5 @@
 !> Run a case whose forces have fixed axes: `inertial_loads CASE.nml RESULT.h5`. Those on the spacecraft and on nodes, which a
-!> case
-!> gives along the moving axes, are turned back by the rotation of the spacecraft; moments are left as they are.
+!> case gives along the moving axes, are turned back by the rotation of the spacecraft; moments are left as they are.
 module fixed_axes
    use rodyn, only: wp, scene_type, user_load
    implicit none (type, external)
