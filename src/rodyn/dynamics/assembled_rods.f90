@@ -15,7 +15,7 @@ module rodyn_assembled_rods
    public :: sum_rods
 
    integer, parameter :: most = 3 + most_shapes !! unknowns of a rod at most: A, W', x
-   integer, parameter, public :: n_map_rows = 2 + 2*most !! memory: maps to the acceleration of a node and to a rod's, m_k times that
+   integer, parameter, public :: n_map_rows = 2 + 2*most !! memory: maps to accelerations of a node and of a rod, m_k times that
 
 contains
 
