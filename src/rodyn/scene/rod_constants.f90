@@ -38,6 +38,8 @@ module rodyn_rod_constants
       real(wp) :: length_m1 = 0.0_wp         !! l m1 of the reduced inertias [kg m^2]
       real(wp) :: offset = 0.0_wp            !! l m0 - m1 of them [kg m]
       real(wp) :: outer = 0.0_wp             !! m2 - 2 l m1 + l^2 m0 of them: moment about the outer node [kg m^2]
+      real(wp) :: by_chord(2, 2) = 0.0_wp    !! B^-1 D(l) [1/(kg m)]
+      real(wp) :: by_first(2, 2) = 0.0_wp    !! B^-1 E [1/m]
    end type rod_constants
 
 contains
@@ -202,6 +204,10 @@ contains
          rod%m0_reduced = i%m0 - i%a1*rod%g(1) - i%b1*rod%g(2)
          rod%m1_reduced = i%m1 - i%sa*rod%g(1) - i%sb*rod%g(2)
          rod%m2_reduced = i%m2 - i%sa*rod%h(1) - i%sb*rod%h(2)
+      end associate
+      associate (d => rod%shortening%chord, e => rod%shortening%first)
+         rod%by_chord = reshape([solve_b(rod, d(1), d(2)), solve_b(rod, d(2), d(3))], [2, 2])
+         rod%by_first = reshape([solve_b(rod, e(1), e(2)), solve_b(rod, e(2), e(3))], [2, 2])
       end associate
    end subroutine reduce
 
