@@ -3,7 +3,8 @@
     python tools/write_ninja.py STAGE COMPILER FLAGS LIBRARIES
 
 A file is compiled after those whose modules it uses. gfortran leaves a module file alone if what the module offers is still the
-same; then nothing that uses it is compiled again. The code of tests is not optimised: that would take longer than to run it.
+same; then nothing that uses it is compiled again. Folders whose code takes no time are optimised less, and the code of tests is not:
+that would take longer than to run it.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ rule link
   command = {compiler} {flags} -o $out $in {libraries}
   description = $out
 """
+LESS = {("src", "rodyn", folder): "-O1" for folder in ("input", "output", "sweep", "program")}
 PROGRAMS = {"app/main.F90": "bin/rodyn", "test/main.f90": "test/tester", "test/sample_run.f90": "test/sample_run"}
 ARCHIVES = {"src": "lib/librodyn.a", "test": "objects/libtest.a"}
 
@@ -56,7 +58,7 @@ def main() -> None:
         needed += [str(path.parent / name) for name in INCLUDE.findall(text)]
         print(f"build {made}{' | ' * bool(offered)}{' '.join(offered)}: compile {path} | {' '.join(needed)}")
         print(f"  modules = {modules_of[folder]}")
-        print("  more = -O0" * (folder == "test"))
+        print("  more =", "-O0" if folder == "test" else LESS.get(path.parts[:3], "") if "-O3" in flags else "")
         if str(path) in PROGRAMS:
             parts = [made, *in_c] if folder == "app" else [made, f"{stage}/{ARCHIVES['test']}"]
             print(f"build {stage}/{PROGRAMS[str(path)]}: link {' '.join(parts)} {stage}/{ARCHIVES['src']}")
