@@ -52,7 +52,7 @@ module test_driver
       '&spacecraft mass = 150, inertia = 150, hinge_x = 0.5 /'//nl// &
       '&chain n_rods = 1, length = 1, mass_per_length = 2, bending_stiffness = 3e4, hinge_stiffness = 5 /'//nl// &
       '&initial phi = 0.8 /'//nl
-   character(len=*), parameter :: rattling = '&case t_end = 30 /'//nl// &
+   character(len=*), parameter :: rattling = '&case t_end = 12 /'//nl// &
       '&spacecraft mass = 150, inertia = 150, hinge_x = 0.5 /'//nl// &
       '&chain n_rods = 2, length = 1, mass_per_length = 2, bending_stiffness = 3e4, hinge_stiffness = 50 /'//nl// &
       '&initial phi = 0.5, 0.1 /'//nl// &

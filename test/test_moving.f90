@@ -1110,9 +1110,9 @@ contains
                if (k > 0) hinge%release_after = k - 1
             end associate
          end do
-         config%t_end = 6.0_wp
+         config%t_end = 2.0_wp
          config%chain%hinge_damping = 0.5_wp
-         call integrate(config, [0.0_wp, 1.0_wp, 2.0_wp, 6.0_wp], run, error)
+         call integrate(config, [0.0_wp, 0.5_wp, 1.0_wp, 2.0_wp], run, error)
          if (allocated(error)) then
             error%message = kind_name(which)//': '//error%message
             return
