@@ -202,7 +202,7 @@ contains
 
    subroutine look_away(self, motion, t, y, error)
       class(nobody), intent(inout) :: self
-      type(motion_type), intent(in) :: motion
+      type(motion_type), intent(inout) :: motion
       real(wp), intent(in) :: t, y(:)
       type(error_type), allocatable, intent(out) :: error
       associate (unused => self, unused_motion => motion, unused_t => t, unused_y => y, unused_error => error); end associate

@@ -38,6 +38,7 @@ program tester
    use test_step_limit, only: collect_step_limit
    use test_sweep, only: collect_sweep
    use test_switches, only: collect_switches
+   use test_rod_forces, only: collect_rod_forces
    use test_validity, only: collect_validity
    implicit none (type, external)
 
@@ -77,6 +78,7 @@ program tester
    call run('driver', collect_driver)
    call run('step_limit', collect_step_limit)
    call run('quantities', collect_quantities)
+   call run('rod_forces', collect_rod_forces)
    call run('validity', collect_validity)
    call run('progress', collect_progress)
    call run('namelist', collect_namelist)

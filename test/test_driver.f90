@@ -334,7 +334,7 @@ contains
 
    subroutine observe(self, motion, t, y, error)
       class(keeper), intent(inout) :: self
-      type(motion_type), intent(in) :: motion
+      type(motion_type), intent(inout) :: motion
       real(wp), intent(in) :: t, y(:)
       type(error_type), allocatable, intent(out) :: error
       associate (unused => motion, unused_t => t); end associate

@@ -145,7 +145,7 @@ contains
 
    subroutine keep(self, motion, t, y, error)
       class(keeper), intent(inout) :: self
-      type(motion_type), intent(in) :: motion
+      type(motion_type), intent(inout) :: motion
       real(wp), intent(in) :: t, y(:)
       type(error_type), allocatable, intent(out) :: error
       associate (unused => t, unused_motion => motion); end associate

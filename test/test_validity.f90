@@ -89,7 +89,7 @@ contains
       type(validity_type) :: validity
       type(row_type) :: row
 
-      validity = new_validity(one_rod('dynamic'), layout(), 0.05_wp)
+      validity = new_validity(one_rod('dynamic'), layout(), 1, 0.05_wp, 0.01_wp)
       row = new_row(layout())
       call bend(row, 4.0_wp*0.0499_wp, 0.0_wp)
       call validity%observe(row)
@@ -146,7 +146,7 @@ contains
       real(wp), parameter :: own = 24.674011002723393_wp ! (pi/2)^2 10
       integer :: i
 
-      validity = new_validity(one_rod('dynamic'), layout(), 1.0_wp)
+      validity = new_validity(one_rod('dynamic'), layout(), 1, 1.0_wp, 0.01_wp)
       row = new_row(layout())
       row%values(row%layout%before('phi_rate') + 1) = 1.0_wp
       do i = 1, 500
@@ -162,7 +162,7 @@ contains
       type(validity_type) :: validity
       type(row_type) :: row
 
-      validity = new_validity(one_rod('rigid'), layout(), 1.0e-3_wp)
+      validity = new_validity(one_rod('rigid'), layout(), 1, 1.0e-3_wp, 0.01_wp)
       row = new_row(layout())
       call bend(row, 1.0_wp, 0.0_wp)
       call validity%observe(row)

@@ -80,7 +80,7 @@ contains
 
    subroutine observe(self, motion, t, y, error)
       class(trajectory), intent(inout) :: self
-      type(motion_type), intent(in) :: motion
+      type(motion_type), intent(inout) :: motion
       real(wp), intent(in) :: t
       real(wp), intent(in) :: y(:)
       type(error_type), allocatable, intent(out) :: error

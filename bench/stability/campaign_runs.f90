@@ -66,7 +66,7 @@ contains
 
    subroutine observe(self, motion, t, y, error)
       class(invariant_recorder), intent(inout) :: self
-      type(motion_type), intent(in) :: motion
+      type(motion_type), intent(inout) :: motion
       real(wp), intent(in) :: t, y(:)
       type(error_type), allocatable, intent(out) :: error
       type(invariants_type) :: now

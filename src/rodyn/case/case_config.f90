@@ -70,6 +70,7 @@ module rodyn_case_config
       integer :: gauss_points = 4                              !! points of the rule for the rod integrals
       character(len=name_length) :: kernel = 'recursive'       !! 'recursive' or 'assembled'
       real(wp) :: deflection_limit = 0.06_wp                   !! deflection/length beyond which a run is warned of
+      real(wp) :: axial_error_limit = 0.01_wp                  !! error of bending by axial force beyond which it is warned of
    end type model_config
 
    !> &initial
@@ -303,6 +304,8 @@ contains
          help='O(n) recursion, or the assembled system and LAPACK'))
       call visitor%field(model%deflection_limit, key('deflection_limit', rule=positive, &
          help='a run warns if a rod bends by more than this part of its length; its chord is then 1 % too long'))
+      call visitor%field(model%axial_error_limit, key('axial_error_limit', rule=positive, &
+         help='a run warns if axial force may put the bending of a rod off by more than this part'))
       call visitor%close_group()
    end subroutine visit_model
 

@@ -10,7 +10,7 @@ module rodyn_condensed
    use rodyn_kinds, only: wp
    use rodyn_scene, only: scene_type
    use rodyn_hinge_law, only: hinge_law, openings
-   use rodyn_kinematics, only: slopes
+   use rodyn_kinematics, only: acceleration_of_hinge_0, slopes
    use rodyn_three_moments, only: slopes_from_moments
    implicit none (type, external)
    private
@@ -144,18 +144,5 @@ contains
       call moments_of_slopes(hinges, on_alpha, on_beta, added)
       moment(0:scene%n) = moment(0:scene%n) + added
    end subroutine add_inertia_moments
-
-   !> Along the moving axes [m/s^2].
-   pure function acceleration_of_hinge_0(scene, p, a) result(node)
-      type(scene_type), intent(in) :: scene
-      real(wp), intent(in) :: p(:), a(:)
-      real(wp) :: node(2)
-
-      node = 0.0_wp
-      if (scene%n_base == 0) return
-      associate (x => scene%body%hinge_x, y => scene%body%hinge_y, w => p(3))
-         node = [a(1) - w*p(2) - a(3)*y - w**2*x, a(2) + w*p(1) + a(3)*x - w**2*y]
-      end associate
-   end function acceleration_of_hinge_0
 
 end module rodyn_condensed

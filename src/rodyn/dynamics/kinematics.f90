@@ -9,7 +9,7 @@ module rodyn_kinematics
    use rodyn_three_moments, only: slopes_from_moments
    implicit none (type, external)
    private
-   public :: invariants_type, invariants, load_power, slopes, kinetic_energy, elastic_energy
+   public :: invariants_type, invariants, load_power, slopes, kinetic_energy, elastic_energy, acceleration_of_hinge_0
 
    !> What the ledger records of a state. Momenta along inertial axes, angular momentum about their origin.
    type :: invariants_type
@@ -151,6 +151,19 @@ contains
       u = p(1:2) + omega*[-place(2), place(1)]
       place = place + q(1:2)
    end subroutine at_hinge_0
+
+   !> Absolute acceleration of hinge 0, moving axes [m/s^2].
+   pure function acceleration_of_hinge_0(scene, p, a) result(node)
+      type(scene_type), intent(in) :: scene
+      real(wp), intent(in) :: p(:), a(:) !! rates and their rates (dof)
+      real(wp) :: node(2)
+
+      node = 0.0_wp
+      if (scene%n_base == 0) return
+      associate (x => scene%body%hinge_x, y => scene%body%hinge_y, w => p(3))
+         node = [a(1) - w*p(2) - a(3)*y - w**2*x, a(2) + w*p(1) + a(3)*x - w**2*y]
+      end associate
+   end function acceleration_of_hinge_0
 
    pure real(wp) function cross(a, b)
       real(wp), intent(in) :: a(2), b(2)

@@ -23,10 +23,11 @@ module rodyn_modes_file
 contains
 
    !> Write everything and give the file its name.
-   subroutine write_modes(path, force, origin, scene, hinges, model, modes, equilibrium, error)
+   subroutine write_modes(path, force, origin, warnings, scene, hinges, model, modes, equilibrium, error)
       character(len=*), intent(in) :: path
       logical, intent(in) :: force             !! replace an existing file
       type(provenance), intent(in) :: origin
+      character(len=*), intent(in) :: warnings !! where the model does not hold, one line each
       type(scene_type), intent(in) :: scene
       type(hinge_law), intent(in) :: hinges
       type(linear_model), intent(in) :: model
@@ -119,6 +120,7 @@ contains
       end subroutine matrix
 
       subroutine write_summary()
+         call file%file%put_attribute('/', 'warnings', warnings)
          call file%file%put_attribute('/', 'at', trim(merge('equilibrium  ', 'initial state', equilibrium)))
          call file%file%put_attribute('/', 'stable', all([(modes%is_stable(i), i=1, modes%n)]))
          call file%file%put_attribute('/', 'conservative', modes%conservative)

@@ -12,11 +12,13 @@ module rodyn_modal_analysis
    use rodyn_modes_at_start, only: modes_at_start
    use rodyn_modes_file, only: write_modes
    use rodyn_notes, only: notes_on
+   use rodyn_quantities, only: layout_of
    use rodyn_result_file, only: check_output_path, provenance
    use rodyn_run_needs, only: check_memory, memory_of_scene, of_program
    use rodyn_run_setup, only: run_setup, new_run_setup
    use rodyn_terminal, only: print_line
    use rodyn_text, only: formatted, joined, to_text
+   use rodyn_validity, only: validity_type, new_validity
    implicit none (type, external)
    private
    public :: analyse_modes
@@ -41,6 +43,7 @@ contains
       type(linear_model) :: model
       type(mode_set) :: modes
       type(provenance) :: origin
+      type(validity_type) :: validity
       logical :: silent, replace
 
       silent = .false.
@@ -60,13 +63,16 @@ contains
       origin%sundials_version = sundials_version()
       if (present(input_text)) origin%input = input_text
       associate (scene => setup%motion%dynamics%scene, hinges => setup%motion%dynamics%hinges)
+         validity = new_validity(scene, layout_of(config), 1, config%model%deflection_limit, config%model%axial_error_limit)
+         call validity%judge_forces(setup%motion%dynamics, 0.0_wp, model%q, model%p, model%acceleration)
          origin%notes = joined(case_notes(config, .false.), notes_on(scene, hinges, model%q(:scene%n_dof), .false.), new_line('a'))
-         call write_modes(path, replace, origin, scene, hinges, model, modes, equilibrium, error)
+         call write_modes(path, replace, origin, validity%warnings(), scene, hinges, model, modes, equilibrium, error)
       end associate
       if (allocated(error) .or. silent) return
       call print_table(modes)
       if (.not. equilibrium .and. .not. model%is_steady(modes%fastest)) call print_line(&
          'note    the initial state is no equilibrium: these are the modes of its equations held at t = 0; see --equilibrium')
+      if (len(validity%warnings()) > 0) call print_line('warning '//validity%warnings())
       call print_line('file    '//path)
    end subroutine analyse_modes
 

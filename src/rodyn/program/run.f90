@@ -25,10 +25,12 @@ module rodyn_run
    use rodyn_hinge_mechanism, only: kind_names
    use rodyn_user_load, only: user_load
    use rodyn_step_limit, only: check_fixed_step
-   use rodyn_validity, only: validity_type, new_validity
+   use rodyn_validity, only: validity_type, interval_of_rows, new_validity
    implicit none (type, external)
    private
    public :: run_case, check_steps
+
+   integer, parameter :: most_judgements = 500 !! of axial forces, about: 1 % of what as many rows cost to write
 
    !> Writes rows into the run file.
    type, extends(observer_type) :: recorder_type
@@ -151,13 +153,14 @@ contains
       recorder%kinetic = header%layout%before('energy_kinetic') + 1
       recorder%elastic = header%layout%before('energy_elastic') + 1
       recorder%residual = header%layout%before('energy_residual') + 1
-      recorder%validity = new_validity(motion%dynamics%scene, header%layout, config%model%deflection_limit)
+      recorder%validity = new_validity(motion%dynamics%scene, header%layout, interval_of_rows(header%n_rows, most_judgements), &
+                                       config%model%deflection_limit, config%model%axial_error_limit)
    end subroutine begin_file
 
    !> Write one row.
    subroutine observe(self, motion, t, y, error)
       class(recorder_type), intent(inout) :: self
-      type(motion_type), intent(in) :: motion
+      type(motion_type), intent(inout) :: motion
       real(wp), intent(in) :: t
       real(wp), intent(in) :: y(:)
       type(error_type), allocatable, intent(out) :: error
@@ -180,6 +183,7 @@ contains
          end associate
       end if
       call self%validity%observe(self%row)
+      call self%validity%observe_forces(motion, t, y)
       call self%file%append(self%row, error)
    end subroutine observe
 

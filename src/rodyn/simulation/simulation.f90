@@ -32,7 +32,7 @@ module rodyn_simulation
          import :: observer_type, motion_type, error_type, wp
          implicit none (type, external)
          class(observer_type), intent(inout) :: self
-         type(motion_type), intent(in) :: motion
+         type(motion_type), intent(inout) :: motion !! its memory may be used, its state is not the observer's to change
          real(wp), intent(in) :: t    !! [s]
          real(wp), intent(in) :: y(:) !! (n_states)
          type(error_type), allocatable, intent(out) :: error

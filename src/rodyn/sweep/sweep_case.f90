@@ -23,7 +23,7 @@ module rodyn_sweep_case
    use rodyn_simulation, only: observer_type, listed_times, simulate
    use rodyn_sweep_config, only: sweep_axis, sweep_config, is_ratio, short_value_text
    use rodyn_sweep_plan, only: sweep_plan
-   use rodyn_validity, only: validity_type, new_validity
+   use rodyn_validity, only: validity_type, interval_of_rows, new_validity
    use rodyn_text, only: joined, short_text, with_line_ends
    implicit none (type, external)
    private
@@ -85,6 +85,8 @@ module rodyn_sweep_case
    contains
       procedure :: stop_requested
    end type case_monitor
+
+   integer, parameter :: most_judgements = 64 !! of axial forces in a case, about: below 1 % of its time in lanes
 
    !> Keeps the states that are wanted.
    type, extends(observer_type) :: keeper_type
@@ -278,11 +280,16 @@ contains
       call build_case(sweep, plan, case, config, error)
       if (.not. allocated(error)) call new_run_setup(setup, config, .false., error)
       if (allocated(error)) return
+      call merge_times(config, sweep%probe_times, shape%outputs, times, keeper%probe_of, keeper%output_of)
+      keeper%layout = shape%layout
+      keeper%row = new_row(resized(shape%layout, config%chain%n_rods))
+      keeper%validity = new_validity(setup%motion%dynamics%scene, keeper%row%layout, &
+                                     interval_of_rows(size(times), most_judgements), config%model%deflection_limit, &
+                                     config%model%axial_error_limit)
       if (sweep%frequencies > 0) call keep_frequencies(setup%motion%dynamics%scene, config, &
-                                                       sweep%frequencies_at == 'equilibrium', keeper%kept, error)
+                                                       sweep%frequencies_at == 'equilibrium', keeper, error)
       if (allocated(error) .or. .not. sweep%integrate) return
       monitor = new_monitor(sweep, poller, clock_start, late)
-      call merge_times(config, sweep%probe_times, shape%outputs, times, keeper%probe_of, keeper%output_of)
       call new_driver(driver, setup%motion, setup%y, config%solver, config%t_end, size(times), error, monitor)
       nullify (driver%monitor)
       if (allocated(error)) return
@@ -290,20 +297,17 @@ contains
          if (monitor%stop_requested()) call raise(error, 'stopped on request at t = 0 s', exit_stopped)
          if (allocated(error)) return
       end if
-      keeper%layout = shape%layout
-      keeper%row = new_row(resized(shape%layout, config%chain%n_rods))
-      keeper%validity = new_validity(setup%motion%dynamics%scene, keeper%row%layout, config%model%deflection_limit)
       keeper%t_end = config%t_end
       keeper%n_outputs = config%n_outputs
       keeper%keep_series = sweep%keep_series
    end subroutine prepare_case
 
    !> The lowest natural frequencies, rigid bodies and mechanisms left out.
-   subroutine keep_frequencies(scene, config, equilibrium, kept, error)
+   subroutine keep_frequencies(scene, config, equilibrium, keeper, error)
       type(scene_type), intent(in) :: scene
       type(case_config), intent(in) :: config
       logical, intent(in) :: equilibrium !! at the one near the initial state, under loads; otherwise there, without loads
-      type(case_result), intent(inout) :: kept
+      type(keeper_type), intent(inout) :: keeper
       type(error_type), allocatable, intent(out) :: error
       type(motion_type) :: motion !! of its own: matrices would stay with the one that is integrated
       type(linear_model) :: model
@@ -317,11 +321,15 @@ contains
                                                      model=model, modes=modes, error=error)
       if (allocated(error)) return
       which = modes%oscillations()
-      n = min(size(which), size(kept%frequency))
       frequency = modes%frequency()
       ratio = modes%damping_ratio()
-      kept%frequency(:n) = frequency(which(:n))
-      kept%damping_ratio(:n) = ratio(which(:n))
+      associate (kept => keeper%kept)
+         n = min(size(which), size(kept%frequency))
+         kept%frequency(:n) = frequency(which(:n))
+         kept%damping_ratio(:n) = ratio(which(:n))
+         call keeper%validity%judge_forces(motion%dynamics, 0.0_wp, model%q, model%p, model%acceleration)
+         kept%message = with_line_ends(keeper%validity%warnings(), '; ')
+      end associate
    end subroutine keep_frequencies
 
    !> Integrate a prepared case by itself, and keep what is wanted.
@@ -368,6 +376,7 @@ contains
       call setup%motion%dynamics%move_kinks(setup%t_end)
       call fill_row(setup%motion, setup%t_end, setup%y, 0.0_wp, keeper%row)
       call keeper%validity%observe(keeper%row)
+      call keeper%validity%observe_forces(setup%motion, setup%t_end, setup%y)
       keeper%kept%message = with_line_ends(keeper%validity%warnings(), '; ') ! a message has no line ends
       call place(keeper%row, keeper%layout, keeper%kept%final)
    end subroutine keep_final
@@ -454,7 +463,7 @@ contains
    !> Keep the state at a time, if it is to be kept.
    subroutine observe(self, motion, t, y, error)
       class(keeper_type), intent(inout) :: self
-      type(motion_type), intent(in) :: motion
+      type(motion_type), intent(inout) :: motion
       real(wp), intent(in) :: t
       real(wp), intent(in) :: y(:)
       type(error_type), allocatable, intent(out) :: error
@@ -470,6 +479,7 @@ contains
       if (probe == 0 .and. .not. self%keep_series) return
       call fill_row(motion, t, y, 0.0_wp, self%row)
       call self%validity%observe(self%row)
+      call self%validity%observe_forces(motion, t, y)
       if (probe > 0) call place(self%row, self%layout, self%kept%probes(:, probe))
       if (output == 0 .or. .not. self%keep_series) return
       self%kept%times(output) = t
