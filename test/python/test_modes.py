@@ -20,7 +20,7 @@ TEXTS = ["title", "status", "program_version", "git_commit", "compiler", "input"
 
 def modes_of(directory: pathlib.Path, text: str, *options: str) -> xarray.Dataset:
     write_case(directory, text)
-    result = rodyn("modes", "case.nml", "--force", *options, cwd=directory)
+    result = rodyn("modes", "case.nml", "--output", "case_modes.h5", "--force", *options, cwd=directory)
     assert result.returncode == 0, result.stderr
     return result_files.read(directory / "case_modes.h5")
 
@@ -139,11 +139,19 @@ def test_kinks_fold_the_equilibrium(tmp_path):
     assert data.attrs["at"] == "equilibrium"
 
 
+def test_modes_about_each_state_have_a_file_of_their_own(tmp_path):
+    write_case(tmp_path, SPACECRAFT + KINKED)
+    for options in ([], ["--equilibrium"], ["--loads"]):
+        result = rodyn("modes", "case.nml", *options, cwd=tmp_path)
+        assert result.returncode == 0, result.stderr
+    assert {path.name for path in tmp_path.glob("*.h5")} == {f"case_modes{state}.h5" for state in ("", "_equilibrium", "_loads")}
+
+
 def test_where_there_is_no_equilibrium_that_is_said(tmp_path):
     write_case(tmp_path, SCENES["no ledger"])
     result = rodyn("modes", "case.nml", "--equilibrium", cwd=tmp_path)
     assert result.returncode == 1 and "give the spacecraft an angular acceleration" in result.stderr
-    assert not (tmp_path / "case_modes.h5").exists()
+    assert not list(tmp_path.glob("*.h5"))
     write_case(tmp_path, FIXED + KINKED + "&load target = 'node', node = 1, component = 'Y', law = 'sine_squared', value = 1, rate = 1 /\n")
     result = rodyn("modes", "case.nml", "--equilibrium", cwd=tmp_path)
     assert result.returncode == 1 and "a load or a kink varies in time" in result.stderr

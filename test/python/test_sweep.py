@@ -524,7 +524,7 @@ def test_frequencies_at_equilibria_are_those_of_rodyn_modes(here):
     assert "at the equilibrium" in data.frequency.long_name and np.isnan(data.frequency[:, 1]).all()
     for case, value in enumerate((-10, 30)):
         (here / "one.nml").write_text(base.replace("-10", str(value)))
-        subprocess.run([RODYN, "modes", "one.nml", "--equilibrium", "--force", "--quiet"], cwd=here, check=True)
+        subprocess.run([RODYN, "modes", "one.nml", "--equilibrium", "--output", "one_modes.h5", "--force", "--quiet"], cwd=here, check=True)
         found = result_files.read(here / "one_modes.h5")
         np.testing.assert_allclose(data.frequency[case, 0], found.frequency[0], rtol=1e-12)
         # One rod of length 2 and J = 1.5 8/3 on C = 40 with X, Y at its end: J w^2 = C + 2 (X cos phi + Y sin phi).

@@ -167,7 +167,10 @@ contains
 
       call read_one_case(options%file, 'modes are those of one case', input, config, error)
       if (allocated(error)) return
-      path = result_name(options, '_modes.h5')
+      path = '_modes'
+      if (options%equilibrium) path = path//'_equilibrium'
+      if (options%loads) path = path//'_loads'
+      path = result_name(options, path//'.h5')
       call refuse_input(path, options, error)
       if (.not. allocated(error)) call analyse_modes(config, path, options%equilibrium, options%loads, error, &
                                                      input_text=input%text, &
@@ -416,7 +419,8 @@ contains
          text = 'rodyn modes CASE.nml [--equilibrium | --loads] [--output FILE.h5] [--force] [--quiet]'//nl// &
                 '  Linearise the scene in full at its initial state, without its loads. Natural frequencies,'//nl// &
                 '  damping ratios, mode shapes and matrices go to one HDF5 file (default: CASE_modes.h5 in the working'//nl// &
-                '  directory), a table to the terminal. - reads the case from standard input.'//nl// &
+                '  directory, or CASE_modes_equilibrium.h5, CASE_modes_loads.h5), a table to the terminal. - reads the'//nl// &
+                '  case from standard input.'//nl// &
                 '  --equilibrium      at the equilibrium near the initial state instead, under the loads that act at'//nl// &
                 '                     t = 0 (they must be constant), at rest on a spacecraft with the initial spin'//nl// &
                 '  --loads            at the initial state, under the loads that act at t = 0'//nl// &
