@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 import pathlib
 import sys
+from collections.abc import Sequence
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parent)]
@@ -35,10 +36,10 @@ def rods(share: float, limit: float) -> int:
     return math.ceil(math.sqrt(share / limit))
 
 
-def rows(program: benchmarks.Program) -> list[list[str]]:
-    table = []
+def rows(program: benchmarks.Program, cases: Sequence[str] = ("blade", "column", "thrust")) -> list[list[str]]:
+    table: list[list[str]] = []
     for benchmark in benchmarks.BENCHMARKS:
-        if benchmark.case not in ("blade", "column", "thrust"):
+        if benchmark.case not in cases:
             continue
         share = force(benchmark) / math.pi**2
         table += [[f"{benchmark.case}: {quantity.name}", f"{share:.2f}"] for quantity in benchmark.quantities]

@@ -18,8 +18,9 @@ import axial_limit  # noqa: E402
 import benchmarks  # noqa: E402
 import run  # noqa: E402
 
-WARNING = re.compile(r"the axial force in rod (\d+) is (\S+) of its Euler load pi\^2 EI/l\^2 \((\S+) N of (\w+) at t = (\S+) s\); above (\S+) "
-                     r"bending .*; divide it into (\d+) rods(?:, or take formulation = 'inextensible' with dynamic bending(?:, which needs (\d+))?)?")
+WARNING = re.compile(r"the axial force in rod (\d+) is (\S+) of its Euler load pi\^2 EI/l\^2 \((\S+) N of (\w+) at t = (\S+) s\); "
+                     r"above (\S+) bending .*; divide it into (\d+) rods"
+                     r"(?:, or take formulation = 'inextensible' with dynamic bending(?:, which needs (\d+))?)?")
 
 
 def rodyn(directory: pathlib.Path, command: str, text: str, *options: str) -> str:
@@ -64,6 +65,13 @@ def test_a_blade_cut_as_the_warning_says_has_none_and_is_right_to_one_per_cent(t
     assert abs(run.errors(blade.quantities[0], [lowest])[0]) < 0.01
 
 
+def test_columns_cut_so_are_right_to_one_per_cent_as_the_document_says(tmp_path):
+    document = (ROOT / "docs" / "stability.md").read_text(encoding="utf-8")
+    for row in axial_limit.rows(benchmarks.Program(tmp_path), ["column"]):
+        assert f"| {' | '.join(row)} |" in document
+        assert all(abs(float(error.replace("−", "-"))) < 0.01 for error in row[3::2])
+
+
 COLUMN = """&case t_end = 0.01, n_outputs = 10 /
 &spacecraft motion = 'fixed' /
 &chain n_rods = 2, length = 0.5, mass_per_length = 1, bending_stiffness = 1, hinge_stiffness = 0 /
@@ -94,13 +102,15 @@ def test_rods_that_bend_by_statics_are_judged_as_chords_and_rigid_ones_are_not(t
 @pytest.mark.parametrize("method", ["dop853", "gauss"])  # the former in lanes
 @pytest.mark.parametrize("sweep", ["", "frequencies = 1, integrate = .false., ", "probe_times = 0.005, keep_series = .true., "])
 def test_cases_of_a_sweep_have_it_in_their_message(tmp_path, sweep, method):
-    (tmp_path / "base.nml").write_text("""&case t_end = 0.01, n_outputs = 10 /
+    (tmp_path / "base.nml").write_text(f"""&case t_end = 0.01, n_outputs = 10 /
 &spacecraft mass = 1e12, inertia = 1e12 /
 &chain n_rods = 1, length = 1, mass_per_length = 1, bending_stiffness = 1, hinge_stiffness = 100 /
 &model formulation = 'consistent' /
-&solver method = '%s' /
-""" % method)
-    (tmp_path / "sweep.nml").write_text(f"&sweep base = 'base.nml', {sweep}combine = 'grid' /\n&axis key = 'initial.omega', values = 0.1, 2 /\n")
+&solver method = '{method}' /
+""")
+    (tmp_path / "sweep.nml").write_text(f"""&sweep base = 'base.nml', {sweep}combine = 'grid' /
+&axis key = 'initial.omega', values = 0.1, 2 /
+""")
     done = subprocess.run([RODYN, "sweep", "sweep.nml", "--output", "out"], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     with h5py.File(tmp_path / "out" / "sweep.h5") as file:

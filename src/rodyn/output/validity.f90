@@ -3,7 +3,8 @@
 !> Three things are left out for rods that bend (docs/model.md sec. 1):
 !> - The chord keeps its length, although bending by v shortens it by int v'^2/2, a part
 !>       (alpha^2/15 - alpha beta/30 + beta^2/15) = (8/3) (v_max/l)^2 for a rod bent to an arc (beta = -alpha)
-!>   of l: 1 % where v_max = 0.06 l, which is the default of `deflection_limit`.
+!>   of l: 1 % where v_max = 0.06 l, which is the default of `deflection_limit`. Where the arc is kept, v'' falls short of the
+!>   curvature v''/sqrt(1 - v'^2) by the same part in the mean.
 !> - The shape is one cubic. That is exact for moments at its ends. The first vibration of the rod between its nodes,
 !>   pi^2 sqrt(EI/m l^4), comes out 11 % too fast, and the slopes of a rod whose ends are moved at half that frequency 1 %
 !>   too small. So a rod had better be cut in two if it vibrates faster than that, with more than 1 % of the energy of its turning.
@@ -250,8 +251,10 @@ contains
       associate (rod => self%rods(k))
          text = 'rod '//to_text(k)//' bends by '//two_digits(rod%deflection)//' of its length (t = '// &
                 time_text(rod%t_deflection)//' s); the model assumes small deflections: above '// &
-                'deflection_limit = '//two_digits(self%deflection_limit)//' its chord is more than '// &
-                two_digits(100.0_wp*8.0_wp/3.0_wp*self%deflection_limit**2)//' % too long'
+                'deflection_limit = '//two_digits(self%deflection_limit)//' its '// &
+                trim(merge('chord    ', 'curvature', self%axial_limit_arc > 0.0_wp))//' is more than '// &
+                two_digits(100.0_wp*8.0_wp/3.0_wp*self%deflection_limit**2)//' % '// &
+                trim(merge('too long ', 'too small', self%axial_limit_arc > 0.0_wp))
       end associate
       associate (others => count(self%rods%deflection > self%deflection_limit) - 1)
          if (others > 0) text = text//trim(merge(', as is ', ', as are', others == 1))//' '//more_rods(others)
