@@ -303,7 +303,7 @@ contains
       call visitor%word_field(model%kernel, key('kernel', words='recursive|assembled', &
          help='O(n) recursion, or the assembled system and LAPACK'))
       call visitor%field(model%deflection_limit, key('deflection_limit', rule=positive, &
-         help='a run warns if a rod bends by more than this part of its length; its chord, or curvature, is then 1 % off'))
+         help='a run warns if a rod bends by more than this part of its length: chord or curvature is 1 % off'))
       call visitor%field(model%axial_error_limit, key('axial_error_limit', rule=positive, &
          help='a run warns if axial force may put the bending of a rod off by more than this part'))
       call visitor%close_group()
