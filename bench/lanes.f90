@@ -57,8 +57,8 @@ module rodyn_lanes_bench
    end type nobody
 
    integer, parameter :: chain_sizes(*) = [4, 16, 64]
-   character(len=*), parameter :: kinds(*) = [character(len=24) :: 'dynamic', 'rigid', 'rigid, lumped', 'quasistatic, lumped', &
-      'quasistatic']
+   character(len=*), parameter :: kinds(*) = [character(len=24) :: 'dynamic', 'dynamic, inextensible', 'rigid', 'rigid, lumped', &
+      'quasistatic, lumped', 'quasistatic']
 
 contains
 
@@ -336,7 +336,8 @@ contains
       c%model%bending = kind
       if (index(kind, ',') > 0) then
          c%model%bending = kind(:index(kind, ',') - 1)
-         c%model%inertia = 'lumped'
+         if (index(kind, 'lumped') > 0) c%model%inertia = 'lumped'
+         if (index(kind, 'inextensible') > 0) c%model%formulation = 'inextensible'
       end if
    end function standard
 

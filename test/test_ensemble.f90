@@ -237,7 +237,7 @@ contains
                if (allocated(error)) return
                difference = maxval(abs(kept%states - alone%states))/maxval(abs(alone%states))
                if (kept%n_seen == size(client%times) .and. .not. kept%t < t_end) then
-                  if (difference < max(1.0e-8_wp, sensitivity(client, i, alone))) cycle
+                  if (difference < max(1.0e-8_wp, 3.0_wp*sensitivity(client, i, alone))) cycle
                end if
                write (text, '(": case ", i0, ": difference ", es9.2, " ", a)') i, difference, trim(kept%message)
             end associate
@@ -247,7 +247,8 @@ contains
       end do
    end subroutine test_kinds
 
-   !> How far a motion is led elsewhere by a change in the last digits of where it begins: chaotic ones are.
+   !> How far a motion is led elsewhere by a change in the last digits of where it begins: chaotic ones are. (One sample: another
+   !> change leads two or three times as far.)
    real(wp) function sensitivity(client, i, alone)
       type(list_client), intent(inout) :: client
       integer, intent(in) :: i

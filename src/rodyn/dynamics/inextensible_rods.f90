@@ -1,4 +1,5 @@
-!> Rods whose arcs keep their length, each for itself: docs/model.md sec. 3, `inextensible`.
+!> Rods whose arcs keep their length, each for itself and, in vector lanes, with the chain beyond: docs/model.md sec. 3,
+!> `inextensible`.
 !>
 !> What a bent rod is to its neighbours does not depend on them, so `lanes` rods are bent at once: several of one scene
 !> (`rodyn_recursion_inextensible`), or the same one of several scenes (`rodyn_lane_recursion_inextensible`).
@@ -7,23 +8,32 @@ module rodyn_inextensible_rods
    use rodyn_kinds, only: wp
    use rodyn_lanes, only: lanes
    use rodyn_lane_rods, only: lane_rod
+   use rodyn_outboard_chain, only: lane_outboard_chain
    implicit none (type, external)
    private
-   public :: bent_rods, bend_rods
+   public :: bent_rods, bend_rods, lane_outward, add_rods
 
-   !> Rods at their slopes and rates, without alpha'', beta'', which are
-   !>     (alpha'', beta'') = x + y f_e + z A_e - g A_n - h W'
-   !> with the acceleration A of the inner node and the force f_e of the outer node on what is beyond it. Without f_e the rows of
-   !> the forces on the inner node along and across the rod and of W', and the motion of the outer node, are
-   !>     (fe, fn, M) = m (A_e, A_n, W') + (re, rn, -r0),
-   !>     A_outer = ((t1, t2), (0, 1)) A + (j1, chord) W' - (pull, fall);
-   !> f_e moves the outer node by -mobility f_e, and is (t1, t2, j1) f_e in the rows.
+   !> Rods at their slopes and rates, without alpha'', beta''. What is left are the accelerations A of the inner node and o, across
+   !> the rod, of the outer one, which turn the rod by
+   !>     W' = (o - A_n + fall)/chord,
+   !> and the force f along the rod on what is beyond it. Without the force on it across the rod, the rows of (A_e, A_n, o) and the
+   !> outer node's acceleration along the rod are
+   !>     m (A_e, A_n, o) + (te, tn, to) f + (re, rn, ro),     (te, tn, to).(A_e, A_n, o) - mobility f - pull.
+   !> Written for o instead of W', the chain beyond adds nothing to the rows of A, however heavy it is.
    type :: bent_rods
-      real(wp), dimension(lanes) :: mee, men, mnn, mew, mnw, mww !! m
-      real(wp), dimension(lanes) :: re, rn, r0
-      real(wp), dimension(lanes) :: t1, t2, j1, chord, mobility, pull, fall
-      real(wp), dimension(lanes) :: xa, xb, ya, yb, za, zb, ga, gb, ha, hb
+      real(wp), dimension(lanes) :: ee, en, nn, eo, no, oo !! m
+      real(wp), dimension(lanes) :: re, rn, ro, te, tn, to, mobility, pull
+      real(wp), dimension(lanes) :: per_chord, fall
+      ! beta'' = xb + yb f + zb A_e - gb A_n - hb W', alpha'' = xa + ya f + za A_e - ga A_n - ha W' - coupling beta''
+      real(wp), dimension(lanes) :: xa, xb, ya, yb, za, zb, ga, gb, ha, hb, coupling
+      real(wp), dimension(lanes) :: inv_a, inv_b, ca, cb, da, db, ea, eb, m1, mv, chord !! on the way to these (`bend_rods`)
    end type bent_rods
+
+   !> What the inward pass leaves of a rod for the outward pass: o and the outer node's acceleration along the rod at A = 0 and by A
+   !> along and across it, f = pee along + pen o + be, and the turn from the axes of rod k - 1.
+   type :: lane_outward
+      real(wp), dimension(lanes) :: o_0, o_e, o_n, along_0, along_e, along_n, pee, pen, be, cd, sd
+   end type lane_outward
 
 contains
 
@@ -35,10 +45,83 @@ contains
       real(wp), dimension(width), intent(in) :: phi_rate, alpha, beta, alpha_rate, beta_rate
       real(wp), dimension(width), intent(in) :: moment_in, moment_out !! T of the hinges at both ends [N m]
       type(bent_rods), intent(inout) :: bent
-      real(wp) :: a, b, u, v, uu, uv, vv, w1, w2, v11, v21, v31, v12, v22, v32, q11, q12, q22, z12, z21, skew, ta, tb, da, db, &
-                  ea, eb, ca, cb, half_a, half_b, b11, b12, b22, inv, ya, yb, za, zb, ga, gb, ha, hb, drawn, mv, qa, qb
+      real(wp) :: a, b, u, v, aa, ab, bb, uu, uv, vv, w, w1, w2, half_w2, b11, b12, b22, coupling, skew, fa, fb, fc, qa, qb, &
+                  ta, tb, b1, ha, hb, mew, mnw, mww, per, eo, no, oo, to, r0, re, rn, fall
       integer :: i
 
+      ! What depends on the slopes only.
+      !$omp simd
+      do i = 1, width
+         a = alpha(i)
+         b = beta(i)
+         aa = a*a
+         ab = (a + a)*b
+         bb = b*b
+
+         ! d' = x.D x' along the rod: the block is B + Q, Q = int m (D x)(D x)^T. Its factors L (inv_a, inv_b)^-1 L^T,
+         ! L = ((1, 0), (coupling, 1)).
+         b11 = rod%aa(i) + rod%products(i, 1)*aa + rod%products(i, 2)*ab + rod%products(i, 3)*bb
+         b12 = rod%ab(i) + rod%products(i, 2)*aa + rod%products(i, 7)*ab + rod%products(i, 5)*bb
+         b22 = rod%bb(i) + rod%products(i, 3)*aa + rod%products(i, 5)*ab + rod%products(i, 6)*bb
+         bent%inv_a(i) = 1.0_wp/b11
+         coupling = b12*bent%inv_a(i)
+         bent%inv_b(i) = 1.0_wp/(b22 - coupling*b12)
+         bent%coupling(i) = coupling
+
+         ! (2 (B - S) + Q) x, and the moment of inertia.
+         bent%ca(i) = (rod%curved(i, 1) + b11)*a + (rod%curved(i, 2) + b12)*b
+         bent%cb(i) = (rod%curved(i, 2) + b12)*a + (rod%curved(i, 3) + b22)*b
+         mww = rod%m2(i) + 0.25_wp*(a*bent%ca(i) + b*bent%cb(i) + rod%twice(i, 1)*aa + rod%twice(i, 2)*ab + rod%twice(i, 3)*bb)
+
+         ! Deflection; foreshortening of the chord and of the first moment.
+         bent%mv(i) = rod%a1(i)*a + rod%b1(i)*b
+         bent%da(i) = rod%shortening(i, 1)*a + rod%shortening(i, 2)*b
+         bent%db(i) = rod%shortening(i, 2)*a + rod%shortening(i, 3)*b
+         bent%ea(i) = rod%drawn(i, 1)*a + rod%drawn(i, 2)*b
+         bent%eb(i) = rod%drawn(i, 2)*a + rod%drawn(i, 3)*b
+         bent%m1(i) = rod%m1(i) - 0.5_wp*(a*bent%ea(i) + b*bent%eb(i))
+         bent%chord(i) = rod%length(i) - 0.5_wp*(a*bent%da(i) + b*bent%db(i))
+         per = 1.0_wp/bent%chord(i)
+         bent%per_chord(i) = per
+
+         ! L^-1 of the columns of alpha'', beta'', and what is left of the matrix without them.
+         bent%db(i) = bent%db(i) - coupling*bent%da(i)
+         bent%eb(i) = bent%eb(i) - coupling*bent%ea(i)
+         b1 = rod%b1(i) - coupling*rod%a1(i)
+         ta = rod%sa(i) + rod%turning_alpha(i, 1)*aa + rod%turning_alpha(i, 2)*ab + rod%turning_alpha(i, 3)*bb
+         tb = rod%sb(i) + rod%turning_beta(i, 1)*aa + rod%turning_beta(i, 2)*ab + rod%turning_beta(i, 3)*bb - coupling*ta
+         bent%ya(i) = bent%inv_a(i)*bent%da(i)
+         bent%yb(i) = bent%inv_b(i)*bent%db(i)
+         bent%za(i) = bent%inv_a(i)*bent%ea(i)
+         bent%zb(i) = bent%inv_b(i)*bent%eb(i)
+         bent%ga(i) = bent%inv_a(i)*rod%a1(i)
+         bent%gb(i) = bent%inv_b(i)*b1
+         ha = bent%inv_a(i)*ta
+         hb = bent%inv_b(i)*tb
+         bent%ha(i) = ha
+         bent%hb(i) = hb
+         mww = mww - ha*ta - hb*tb
+         mew = ha*bent%ea(i) - bent%mv(i) + hb*bent%eb(i)
+         mnw = bent%m1(i) - ha*rod%a1(i) - hb*b1
+         bent%mobility(i) = bent%ya(i)*bent%da(i) + bent%yb(i)*bent%db(i)
+         bent%te(i) = 1.0_wp - bent%za(i)*bent%da(i) - bent%zb(i)*bent%db(i)
+         bent%ee(i) = rod%m0(i) - bent%za(i)*bent%ea(i) - bent%zb(i)*bent%eb(i)
+
+         ! o instead of W'.
+         to = per*(ha*bent%da(i) + hb*bent%db(i))
+         eo = per*mew
+         oo = per*per*mww
+         no = per*mnw - oo
+         bent%to(i) = to
+         bent%eo(i) = eo
+         bent%oo(i) = oo
+         bent%no(i) = no
+         bent%tn(i) = bent%ga(i)*bent%da(i) - to + bent%gb(i)*bent%db(i)
+         bent%en(i) = bent%ga(i)*bent%ea(i) - eo + bent%gb(i)*bent%eb(i)
+         bent%nn(i) = rod%m0(i) - bent%ga(i)*rod%a1(i) - bent%gb(i)*b1 - per*mnw - no
+      end do
+
+      ! Forces, and what depends on the rates: centrifugal and Coriolis terms of v and d, d'' without alpha'', beta''.
       !$omp simd
       do i = 1, width
          a = alpha(i)
@@ -46,95 +129,119 @@ contains
          u = alpha_rate(i)
          v = beta_rate(i)
          uu = u*u
-         uv = 2.0_wp*u*v
+         uv = (u + u)*v
          vv = v*v
-         w1 = omega(i) + phi_rate(i)
-         w2 = w1*w1
-         w1 = 2.0_wp*w1
+         w = omega(i) + phi_rate(i)
+         w1 = w + w
+         w2 = w*w
+         half_w2 = 0.5_wp*w2
 
-         ! d' = x.D x' along the rod: int m (D x)(D x)^T.
-         v11 = rod%products(i, 1)*a + rod%products(i, 2)*b
-         v21 = rod%products(i, 2)*a + rod%products(i, 3)*b
-         v31 = rod%products(i, 4)*a + rod%products(i, 5)*b
-         v12 = rod%products(i, 2)*a + rod%products(i, 4)*b
-         v22 = rod%products(i, 3)*a + rod%products(i, 5)*b
-         v32 = rod%products(i, 5)*a + rod%products(i, 6)*b
-         q11 = a*v11 + b*v21
-         q12 = a*v12 + b*v22
-         q22 = a*v22 + b*v32
-         b11 = rod%aa(i) + q11
-         b12 = rod%ab(i) + q12
-         b22 = rod%bb(i) + q22
-         inv = 1.0_wp/(b11*b22 - b12*b12)
-         b11 = b11*inv
-         b12 = b12*inv
-         b22 = b22*inv ! the inverse is (b22, -b12, b11)
-
-         ! v d' - d v' in the angular momentum.
-         z12 = rod%across_alpha(i, 2)*a + rod%across_alpha(i, 3)*b
-         z21 = rod%across_beta(i, 1)*a + rod%across_beta(i, 2)*b
-         skew = z21 - z12
-         ta = rod%sa(i) + 0.5_wp*(rod%across_alpha(i, 1)*a + rod%across_alpha(i, 2)*b)*a + (z21 - 0.5_wp*z12)*b
-         tb = rod%sb(i) + (z12 - 0.5_wp*z21)*a + 0.5_wp*(rod%across_beta(i, 2)*a + rod%across_beta(i, 3)*b)*b
-
-         ! Foreshortening of the chord and of the first moment, centrifugal and transverse terms.
-         da = rod%shortening(i, 1)*a + rod%shortening(i, 2)*b
-         db = rod%shortening(i, 2)*a + rod%shortening(i, 3)*b
-         ea = rod%drawn(i, 1)*a + rod%drawn(i, 2)*b
-         eb = rod%drawn(i, 2)*a + rod%drawn(i, 3)*b
-         drawn = 0.5_wp*(a*ea + b*eb)
-         half_a = 0.5_wp*(q11*a + q12*b)
-         half_b = 0.5_wp*(q12*a + q22*b)
-         ca = rod%second(i, 1)*a + rod%second(i, 2)*b + half_a
-         cb = rod%second(i, 2)*a + rod%second(i, 3)*b + half_b
-         mv = rod%a1(i)*a + rod%b1(i)*b
-
-         ! Forces on alpha, beta.
-         qa = w2*ca - w1*skew*v - (uu*v11 + uv*v21 + vv*v31) - moment_in(i) - &
-              rod%stiffness(i, 1)*(a + rod%carry_over(i, 1)*b)
-         qb = w2*cb + w1*skew*u - (uu*v12 + uv*v22 + vv*v32) + moment_out(i) - &
-              rod%stiffness(i, 3)*(rod%carry_over(i, 2)*a + b)
-
-         ! Without alpha'', beta''.
-         ya = b22*da - b12*db
-         yb = b11*db - b12*da
-         za = b22*ea - b12*eb
-         zb = b11*eb - b12*ea
-         ga = b22*rod%a1(i) - b12*rod%b1(i)
-         gb = b11*rod%b1(i) - b12*rod%a1(i)
-         ha = b22*ta - b12*tb
-         hb = b11*tb - b12*ta
-         bent%mee(i) = rod%m0(i) - (ea*za + eb*zb)
-         bent%men(i) = ea*ga + eb*gb
-         bent%mnn(i) = rod%m0(i) - (rod%a1(i)*ga + rod%b1(i)*gb)
-         bent%mew(i) = (ea*ha + eb*hb) - mv
-         bent%mnw(i) = rod%m1(i) - drawn - (rod%a1(i)*ha + rod%b1(i)*hb)
-         bent%mww(i) = rod%m2(i) + (a*(ca - 0.5_wp*half_a) + b*(cb - 0.5_wp*half_b)) - (ta*ha + tb*hb)
-         bent%chord(i) = rod%length(i) - 0.5_wp*(a*da + b*db)
-         bent%t1(i) = 1.0_wp - (da*za + db*zb)
-         bent%t2(i) = da*ga + db*gb
-         bent%j1(i) = da*ha + db*hb
-         bent%mobility(i) = da*ya + db*yb
-         bent%pull(i) = w2*bent%chord(i) + (rod%shortening(i, 1)*uu + rod%shortening(i, 2)*uv + rod%shortening(i, 3)*vv) + &
-                        (ya*qa + yb*qb)
-         bent%fall(i) = w1*(da*u + db*v)
-         bent%r0(i) = moment_out(i) - moment_in(i) - (ha*qa + hb*qb) - w1*(u*ca + v*cb) - &
-                      ((rod%across_alpha(i, 1)*uu + rod%across_alpha(i, 2)*uv + rod%across_alpha(i, 3)*vv)*a + &
-                       (rod%across_beta(i, 1)*uu + rod%across_beta(i, 2)*uv + rod%across_beta(i, 3)*vv)*b)
-         bent%re(i) = -w2*(rod%m1(i) - drawn) - w1*(rod%a1(i)*u + rod%b1(i)*v) - &
-                      (rod%drawn(i, 1)*uu + rod%drawn(i, 2)*uv + rod%drawn(i, 3)*vv) - (za*qa + zb*qb)
-         bent%rn(i) = (ga*qa + gb*qb) - w2*mv - w1*(ea*u + eb*v)
-         bent%xa(i) = b22*qa - b12*qb
-         bent%xb(i) = b11*qb - b12*qa
-         bent%ya(i) = ya
-         bent%yb(i) = yb
-         bent%za(i) = za
-         bent%zb(i) = zb
-         bent%ga(i) = ga
-         bent%gb(i) = gb
-         bent%ha(i) = ha
-         bent%hb(i) = hb
+         fa = rod%products(i, 1)*uu + rod%products(i, 2)*uv + rod%products(i, 4)*vv
+         fb = rod%products(i, 2)*uu + rod%products(i, 3)*uv + rod%products(i, 5)*vv
+         fc = rod%products(i, 4)*uu + rod%products(i, 5)*uv + rod%products(i, 6)*vv
+         skew = w1*(rod%skew(i, 1)*a + rod%skew(i, 2)*b)
+         qa = half_w2*bent%ca(i) - moment_in(i) - skew*v - a*fa - b*fb - rod%stiffness(i, 1)*(a + rod%carry_over(i, 1)*b)
+         qb = half_w2*bent%cb(i) + moment_out(i) + skew*u - a*fb - b*fc - rod%stiffness(i, 3)*(rod%carry_over(i, 2)*a + b) - &
+              bent%coupling(i)*qa
+         bent%xa(i) = bent%inv_a(i)*qa
+         bent%xb(i) = bent%inv_b(i)*qb
+         r0 = moment_out(i) - moment_in(i) - w*(u*bent%ca(i) + v*bent%cb(i)) - &
+              a*(rod%across_alpha(i, 1)*uu + rod%across_alpha(i, 2)*uv + rod%across_alpha(i, 3)*vv) - &
+              b*(rod%across_beta(i, 1)*uu + rod%across_beta(i, 2)*uv + rod%across_beta(i, 3)*vv) - bent%ha(i)*qa - bent%hb(i)*qb
+         re = -w2*bent%m1(i) - w1*(rod%a1(i)*u + rod%b1(i)*v) - rod%drawn(i, 1)*uu - rod%drawn(i, 2)*uv - rod%drawn(i, 3)*vv
+         u = u + bent%coupling(i)*v ! L^T of the rates
+         rn = -w2*bent%mv(i) - w1*(bent%ea(i)*u + bent%eb(i)*v)
+         fall = w1*(bent%da(i)*u + bent%db(i)*v)
+         bent%fall(i) = fall
+         bent%pull(i) = w2*bent%chord(i) + rod%shortening(i, 1)*uu + rod%shortening(i, 2)*uv + rod%shortening(i, 3)*vv + &
+                        bent%ya(i)*qa + bent%yb(i)*qb - bent%to(i)*fall
+         bent%re(i) = re - bent%za(i)*qa - bent%zb(i)*qb + bent%eo(i)*fall
+         r0 = bent%per_chord(i)*r0
+         bent%ro(i) = bent%oo(i)*fall - r0
+         bent%rn(i) = rn + bent%ga(i)*qa + bent%gb(i)*qb + bent%no(i)*fall + r0
       end do
    end subroutine bend_rods
+
+   !> Rods with the chains beyond them, as their inner nodes feel them, in the axes of the rods further in (of the spacecraft), in
+   !> all lanes. Derived in `rodyn_recursion_inextensible`. (In a module of its own so that it is not compiled into its caller:
+   !> there the compiler keeps an address for each of its many arrays.)
+   pure subroutine add_rods(rod, node_mass, sine, cosine, inner_sine, inner_cosine, chain, out, smallest)
+      type(bent_rods), intent(in) :: rod
+      real(wp), intent(in) :: node_mass(lanes) !! of the outer nodes [kg]
+      real(wp), dimension(lanes), intent(in) :: sine, cosine, inner_sine, inner_cosine !! of phi, and of that of the rod further in
+      type(lane_outboard_chain), intent(inout) :: chain
+      type(lane_outward), intent(inout) :: out
+      real(wp), intent(inout) :: smallest(lanes)
+      real(wp) :: mu, pee, pen, pnn, det, be, bn, firm, yielding, tnn, ue, se, sn, d, inv, ce, cn, kk, ke, kn, ee, en, nn, f, &
+                  at_rest, kept, r, outer, cd, sd, along, across
+      integer :: i
+
+      !$omp simd
+      do i = 1, lanes
+         ! `add_node`.
+         mu = node_mass(i)
+         det = chain%det(i) + mu*(chain%pee(i) + chain%pnn(i) + mu)
+         pee = chain%pee(i) + mu
+         pnn = chain%pnn(i) + mu
+         pen = chain%pen(i)
+         be = chain%be(i)
+         bn = chain%bn(i)
+         out%pee(i) = pee
+         out%pen(i) = pen
+         out%be(i) = be
+
+         ! `add_rod`.
+         firm = 1.0_wp + rod%mobility(i)*pee
+         yielding = 1.0_wp/firm
+         tnn = pnn + rod%mobility(i)*det
+         ue = pee*rod%to(i) + pen
+         d = rod%oo(i)*firm + tnn + rod%to(i)*(ue + pen)
+         smallest(i) = min(smallest(i), d)
+         inv = 1.0_wp/d
+         se = rod%te(i)*ue
+         sn = rod%tn(i)*ue
+         ce = rod%eo(i)*firm + se
+         cn = rod%no(i)*firm + sn
+
+         ! P without o.
+         kk = pee*rod%oo(i) + det
+         ke = rod%te(i)*kk
+         kn = rod%tn(i)*kk
+         ee = rod%ee(i) + (rod%te(i)*ke - rod%eo(i)*(ce + se))*inv
+         en = rod%en(i) + (rod%tn(i)*ke - rod%eo(i)*cn - se*rod%no(i))*inv
+         nn = rod%nn(i) + (rod%tn(i)*kn - rod%no(i)*(cn + sn))*inv
+
+         ! At rest.
+         ce = ce*inv
+         cn = cn*inv
+         f = yielding*(be - pee*rod%pull(i))
+         at_rest = rod%pull(i) + rod%mobility(i)*f
+         r = bn + rod%ro(i) + rod%to(i)*f - pen*at_rest
+         kept = yielding*(rod%to(i) - rod%mobility(i)*pen)
+         outer = -firm*inv*r
+         out%o_0(i) = outer
+         out%o_e(i) = ce
+         out%o_n(i) = cn
+         out%along_0(i) = kept*outer - at_rest
+         out%along_e(i) = yielding*rod%te(i) - kept*ce
+         out%along_n(i) = yielding*rod%tn(i) - kept*cn
+         be = rod%re(i) + rod%te(i)*f - ce*r
+         bn = rod%rn(i) + rod%tn(i)*f - cn*r
+
+         ! `turn_axes`, with b.
+         cd = cosine(i)*inner_cosine(i) + sine(i)*inner_sine(i)
+         sd = sine(i)*inner_cosine(i) - cosine(i)*inner_sine(i)
+         out%cd(i) = cd
+         out%sd(i) = sd
+         chain%det(i) = ee*nn - en*en
+         along = cd*ee - sd*en
+         across = cd*en - sd*nn
+         chain%pee(i) = cd*along - sd*across
+         chain%pen(i) = sd*along + cd*across
+         chain%pnn(i) = sd*(sd*ee + cd*en) + cd*(sd*en + cd*nn)
+         chain%be(i) = cd*be - sd*bn
+         chain%bn(i) = sd*be + cd*bn
+      end do
+   end subroutine add_rods
 
 end module rodyn_inextensible_rods

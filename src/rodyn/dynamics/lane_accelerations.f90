@@ -6,8 +6,8 @@ module rodyn_lane_accelerations
    use rodyn_lane_hinges, only: lane_rigid_moments, lane_flexible_moments, lane_series_moments, lane_condensed_moments
    use rodyn_lane_recursion_condensed, only: lane_condensed_accelerations
    use rodyn_lane_recursion_flexible, only: lane_flexible_accelerations
-   use rodyn_inextensible_rods, only: bent_rods
-   use rodyn_lane_recursion_inextensible, only: lane_inextensible_accelerations, lane_outward
+   use rodyn_inextensible_rods, only: bent_rods, lane_outward
+   use rodyn_lane_recursion_inextensible, only: lane_inextensible_accelerations
    use rodyn_lane_recursion_rigid, only: lane_rigid_accelerations
    use rodyn_outboard_chain, only: lane_outward_size
    use rodyn_trigonometry, only: sine_cosine

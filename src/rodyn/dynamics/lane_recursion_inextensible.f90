@@ -4,7 +4,7 @@
 !> What a lane computes never depends on another one. The same equations elsewhere: docs/model.md sec. 7.
 module rodyn_lane_recursion_inextensible
    use rodyn_kinds, only: wp
-   use rodyn_inextensible_rods, only: bent_rods, bend_rods
+   use rodyn_inextensible_rods, only: bent_rods, bend_rods, lane_outward, add_rods
    use rodyn_lanes, only: lanes
    use rodyn_lane_rods, only: lane_rod
    use rodyn_lane_spacecraft, only: lane_spacecraft_accelerations
@@ -12,12 +12,6 @@ module rodyn_lane_recursion_inextensible
    implicit none (type, external)
    private
    public :: lane_inextensible_accelerations
-
-   !> What the inward pass leaves of a rod for the outward pass: W', f_e and the acceleration of the outer node at A = 0 and by A
-   !> along and across the rod, and the turn from the axes of rod k - 1.
-   type, public :: lane_outward
-      real(wp), dimension(lanes) :: turn, ce, cn, cd, sd, pull_0, pull_e, pull_n, along_0, along_e, along_n
-   end type lane_outward
 
 contains
 
@@ -73,7 +67,8 @@ contains
             if (loaded) call load_node()
             call bend_rods(lanes, rods(rod_of(k)), omega, p(:, ip + k), alpha(:, k), beta(:, k), p(:, ia + k), p(:, ib + k), &
                            moment(:, k - 1), moment(:, k), bent(k))
-            call add_rod(bent(k), outward(k))
+            call add_rods(bent(k), node_mass(:, k), sine(:, k), cosine(:, k), sine(:, k - 1), cosine(:, k - 1), chain, outward(k), &
+                          smallest)
          end do
       end subroutine inward_pass
 
@@ -85,91 +80,9 @@ contains
          end do
       end subroutine load_node
 
-      !> Rod k with the chain beyond it, as its inner node feels them, in the axes of rod k - 1 (of the spacecraft for k = 1).
-      subroutine add_rod(rod, out)
-         type(bent_rods), intent(in) :: rod
-         type(lane_outward), intent(inout) :: out
-         real(wp) :: mu, pee, pen, pnn, det, be, bn, firm, yielding, tee, ten, tnn, ue, un, se, sn, ve, vn, d, inv, me, mn, ee, &
-                     en, nn, ce, cn, turn, bse, bsn, along, across, cd, sd
-
-         !$omp simd
-         do i = 1, lanes
-            ! `add_node`.
-            mu = node_mass(i, k)
-            det = chain%det(i) + mu*(chain%pee(i) + chain%pnn(i) + mu)
-            pee = chain%pee(i) + mu
-            pnn = chain%pnn(i) + mu
-            pen = chain%pen(i)
-            be = chain%be(i)
-            bn = chain%bn(i)
-
-            ! `add_rod`. The outer node yields along the rod: P~ = ((pee, pen), (pen, tnn))/firm.
-            firm = 1.0_wp + rod%mobility(i)*pee
-            tnn = pnn + rod%mobility(i)*det
-            ue = pee*rod%j1(i) + pen*rod%chord(i)
-            un = pen*rod%j1(i) + tnn*rod%chord(i)
-            se = rod%t1(i)*ue
-            sn = rod%t2(i)*ue + un
-            ve = -rod%t1(i)*rod%chord(i)
-            vn = rod%j1(i) - rod%t2(i)*rod%chord(i)
-            d = rod%mww(i)*firm + (rod%j1(i)*ue + rod%chord(i)*un)
-            smallest(i) = min(smallest(i), d)
-            inv = 1.0_wp/d
-            me = rod%mew(i)*firm
-            mn = rod%mnw(i)*firm
-            ce = me + se
-            cn = mn + sn
-
-            ! P without W'.
-            ee = rod%mee(i) + (rod%t1(i)*rod%t1(i)*pee*rod%mww(i) - rod%mew(i)*(ce + se) + det*ve*ve)*inv
-            en = rod%men(i) + (rod%t1(i)*(pee*rod%t2(i) + pen)*rod%mww(i) - rod%mew(i)*cn - se*rod%mnw(i) + det*ve*vn)*inv
-            nn = rod%mnn(i) + ((rod%t2(i)*(rod%t2(i)*pee + 2.0_wp*pen) + tnn)*rod%mww(i) - rod%mnw(i)*(cn + sn) + det*vn*vn)*inv
-
-            ! At rest.
-            yielding = 1.0_wp/firm
-            tee = yielding*pee
-            ten = yielding*pen
-            tnn = yielding*tnn
-            be = yielding*be
-            bsn = bn - rod%mobility(i)*pen*be - ten*rod%pull(i) - tnn*rod%fall(i)
-            bse = be - tee*rod%pull(i) - ten*rod%fall(i)
-            turn = firm*inv*(rod%r0(i) - (rod%j1(i)*bse + rod%chord(i)*bsn))
-            ce = ce*inv
-            cn = cn*inv
-            along = rod%j1(i)*turn - rod%pull(i)
-            across = rod%chord(i)*turn - rod%fall(i)
-            out%turn(i) = turn
-            out%ce(i) = ce
-            out%cn(i) = cn
-            out%pull_0(i) = tee*along + ten*across + be
-            out%along_0(i) = along - rod%mobility(i)*out%pull_0(i)
-            along = rod%t1(i) - rod%j1(i)*ce
-            out%pull_e(i) = tee*along - ten*rod%chord(i)*ce
-            out%along_e(i) = along - rod%mobility(i)*out%pull_e(i)
-            along = rod%t2(i) - rod%j1(i)*cn
-            across = ((rod%mww(i) - rod%chord(i)*rod%mnw(i))*firm + ue*vn)*inv
-            out%pull_n(i) = tee*along + ten*across
-            out%along_n(i) = along - rod%mobility(i)*out%pull_n(i)
-            be = rod%re(i) + rod%t1(i)*bse + (rod%mew(i) + yielding*se)*turn
-            bn = rod%rn(i) + (bsn*across + bse*((rod%t2(i)*rod%mww(i) - rod%j1(i)*rod%mnw(i))*firm - un*vn)*inv) + cn*rod%r0(i)
-
-            ! `turn_axes`, with b.
-            cd = cosine(i, k)*cosine(i, k - 1) + sine(i, k)*sine(i, k - 1)
-            sd = sine(i, k)*cosine(i, k - 1) - cosine(i, k)*sine(i, k - 1)
-            out%cd(i) = cd
-            out%sd(i) = sd
-            chain%det(i) = ee*nn - en*en
-            chain%pee(i) = cd*cd*ee + sd*(sd*nn - 2.0_wp*cd*en)
-            chain%pnn(i) = cd*cd*nn + sd*(sd*ee + 2.0_wp*cd*en)
-            chain%pen(i) = cd*sd*(ee - nn) + (cd - sd)*(cd + sd)*en
-            chain%be(i) = cd*be - sd*bn
-            chain%bn(i) = sd*be + cd*bn
-         end do
-      end subroutine add_rod
-
       !> phi'', alpha'', beta'' from the acceleration of hinge 0.
       subroutine outward_pass()
-         real(wp) :: along, across, w_rate, pull
+         real(wp) :: along, across, outer, w_rate, f, beta_rate
 
          do k = 1, n
             associate (out => outward(k), rod => bent(k))
@@ -177,13 +90,16 @@ contains
                do i = 1, lanes
                   along = out%cd(i)*ae(i) + out%sd(i)*an(i)
                   across = out%cd(i)*an(i) - out%sd(i)*ae(i)
-                  w_rate = out%turn(i) - out%ce(i)*along - out%cn(i)*across
-                  pull = out%pull_0(i) + out%pull_e(i)*along + out%pull_n(i)*across
+                  outer = out%o_0(i) - out%o_e(i)*along - out%o_n(i)*across
                   ae(i) = out%along_0(i) + out%along_e(i)*along + out%along_n(i)*across
-                  an(i) = across + rod%chord(i)*w_rate - rod%fall(i)
+                  an(i) = outer
+                  w_rate = rod%per_chord(i)*((outer + rod%fall(i)) - across)
+                  f = out%pee(i)*ae(i) + out%pen(i)*outer + out%be(i)
+                  beta_rate = rod%xb(i) + rod%yb(i)*f + rod%zb(i)*along - rod%gb(i)*across - rod%hb(i)*w_rate
                   acceleration(i, ip + k) = w_rate - omega_rate(i)
-                  acceleration(i, ia + k) = rod%xa(i) + rod%ya(i)*pull + rod%za(i)*along - rod%ga(i)*across - rod%ha(i)*w_rate
-                  acceleration(i, ib + k) = rod%xb(i) + rod%yb(i)*pull + rod%zb(i)*along - rod%gb(i)*across - rod%hb(i)*w_rate
+                  acceleration(i, ia + k) = rod%xa(i) + rod%ya(i)*f + rod%za(i)*along - rod%ga(i)*across - rod%ha(i)*w_rate - &
+                                            rod%coupling(i)*beta_rate
+                  acceleration(i, ib + k) = beta_rate
                end do
             end associate
          end do

@@ -17,7 +17,10 @@ module rodyn_lane_rods
       ! Of rods whose arcs keep their length.
       real(wp), dimension(lanes) :: m2, aa, ab, bb
       real(wp), dimension(lanes, 3) :: shortening, drawn, across_alpha, across_beta !! D(l), E, int m Na D, int m Nb D
-      real(wp), dimension(lanes, 6) :: products !! int m D_i D_j: (1,1), (1,2), (2,2), (1,3), (2,3), (3,3)
+      real(wp), dimension(lanes, 3) :: twice, curved !! 2 (B - S), and without B
+      real(wp), dimension(lanes, 3) :: turning_alpha, turning_beta !! Z^T x - Z x/2 of (alpha^2, 2 alpha beta, beta^2)
+      real(wp), dimension(lanes, 2) :: skew     !! Z(2,1) - Z(1,2) of (alpha, beta)
+      real(wp), dimension(lanes, 7) :: products !! int m D_i D_j: (1,1), (1,2), (2,2), (1,3), (2,3), (3,3), half of (2,2) + (1,3)
    end type lane_rod
 
 contains
@@ -53,13 +56,21 @@ contains
       rods%aa(lane) = rod%inertia%aa
       rods%ab(lane) = rod%inertia%ab
       rods%bb(lane) = rod%inertia%bb
+      rods%twice(lane, :) = 2.0_wp*rod%second
+      rods%curved(lane, :) = rods%twice(lane, :) - [rod%inertia%aa, rod%inertia%ab, rod%inertia%bb]
       associate (short => rod%shortening)
          rods%shortening(lane, :) = short%chord(:3)
          rods%drawn(lane, :) = short%first(:3)
          rods%across_alpha(lane, :) = short%across(1, :3)
          rods%across_beta(lane, :) = short%across(2, :3)
          rods%products(lane, :) = [short%products(1, 1), short%products(1, 2), short%products(2, 2), &
-                                   short%products(1, 3), short%products(2, 3), short%products(3, 3)]
+                                   short%products(1, 3), short%products(2, 3), short%products(3, 3), &
+                                   0.5_wp*(short%products(2, 2) + short%products(1, 3))]
+      end associate
+      associate (za => rods%across_alpha(lane, :), zb => rods%across_beta(lane, :))
+         rods%turning_alpha(lane, :) = [0.5_wp*za(1), 0.5_wp*zb(1), zb(2) - 0.5_wp*za(3)]
+         rods%turning_beta(lane, :) = [za(2) - 0.5_wp*zb(1), 0.5_wp*za(3), 0.5_wp*zb(3)]
+         rods%skew(lane, :) = zb(1:2) - za(2:3)
       end associate
    end subroutine put_rod
 

@@ -1,10 +1,10 @@
 !> Accelerations in O(n) of a chain of flexible rods whose arcs keep their length, docs/model.md sec. 3 and 4.2.
 !>
 !> As in `rodyn_recursion_flexible` the chain from rod k outward is, seen from its inner node, an apparent mass P and a bias b.
-!> A bent rod draws its outer node in, so the force f_e that the chain beyond puts on the rod along it bends the rod as well, and
+!> A bent rod draws its outer node in, so the force f that the chain beyond puts on the rod along it bends the rod as well, and
 !> the outer node yields to it by a mobility (`rodyn_inextensible_rods`): the chain beyond is lighter along the rod,
 !>     P~ = P - P e (mobility/(1 + mobility pee)) e P,   b~ alike.
-!> With the outer node's acceleration T A + j W' + c, P' = m + T^T P~ T without W' follows as there: products multiplied
+!> What is eliminated is not W' but the outer node's acceleration o across the rod. Of what is left the products are multiplied
 !> out, so that the large terms cancel on paper.
 !> The same equations elsewhere: docs/model.md sec. 7.
 module rodyn_recursion_inextensible
@@ -20,9 +20,9 @@ module rodyn_recursion_inextensible
    private
    public :: inextensible_recursion, new_inextensible_recursion, inextensible_accelerations
 
-   ! Places in `outward` (`rodyn_outboard_chain`): W', f_e and the acceleration of the outer node as they are at A = 0 and by A
-   ! along and across the rod, and the turn from the axes of rod k - 1.
-   integer, parameter :: of_turn = 1, of_pull = 7, of_along = 13, of_across = 19, of_cosine = 25, of_sine = 27, outward_size = 27
+   ! Places in `outward` (`rodyn_outboard_chain`): accelerations o and along the rod of the outer node as they are at A = 0 and by A
+   ! along and across the rod; (pee, pen, be) there; the turn from the axes of rod k - 1.
+   integer, parameter :: of_outer = 1, of_along = 7, of_force = 13, of_cosine = 19, of_sine = 21, outward_size = 21
 
    !> Memory. Rods stand in groups of `lanes`, from hinge 0 on. One per thread.
    type :: inextensible_recursion
@@ -150,74 +150,58 @@ contains
 
       !> Rod k with the chain beyond it, as its inner node feels them: P and b in the axes of rod k.
       subroutine add_rod()
-         real(wp) :: firm, tnn, ue, un, se, sn, ve, vn, d, inv, yielding, along(2), across(2), pull(2), ce, cn, arm, &
-                     pull_0, along_0, across_0, turn, me, mn, r
+         real(wp) :: firm, yielding, tnn, ue, se, sn, d, inv, ce, cn, kk, ke, kn, f, at_rest, r, kept, outer
 
-         associate (chord => bent(group)%chord(i), mobility => bent(group)%mobility(i), t1 => bent(group)%t1(i), &
-                    t2 => bent(group)%t2(i), j1 => bent(group)%j1(i), mew => bent(group)%mew(i), &
-                    mnw => bent(group)%mnw(i), mww => bent(group)%mww(i), rod => bent(group))
-            ! The outer node yields along the rod: P~ = ((pee, pen), (pen, tnn))/firm. All of the row of W' times `firm`.
+         associate (te => bent(group)%te(i), tn => bent(group)%tn(i), to => bent(group)%to(i), eo => bent(group)%eo(i), &
+                    no => bent(group)%no(i), oo => bent(group)%oo(i), mobility => bent(group)%mobility(i), &
+                    pull => bent(group)%pull(i), rod => bent(group))
+            outward(of_force, k) = pee
+            outward(of_force + 2, k) = pen
+            outward(of_force + 4, k) = be
+
+            ! The outer node yields along the rod: P~ = ((pee, pen), (pen, tnn))/firm. All of the row of o times `firm`.
             firm = 1.0_wp + mobility*pee
+            yielding = 1.0_wp/firm
             tnn = pnn + mobility*det
-            ue = pee*j1 + pen*chord
-            un = pen*j1 + tnn*chord
-            se = t1*ue
-            sn = t2*ue + un
-            ve = -t1*chord
-            vn = j1 - t2*chord
-            d = mww*firm + (j1*ue + chord*un)
+            ue = pee*to + pen
+            d = oo*firm + (to*(ue + pen) + tnn)
             smallest = min(smallest, d)
             inv = 1.0_wp/d
-            me = mew*firm
-            mn = mnw*firm
+            se = te*ue
+            sn = tn*ue
+            ce = eo*firm + se
+            cn = no*firm + sn
 
-            ! P without W'.
-            ee = rod%mee(i) + (t1*t1*pee*mww - mew*(me + 2.0_wp*se) + det*ve*ve)*inv
-            en = rod%men(i) + (t1*(pee*t2 + pen)*mww - mew*(mn + sn) - se*mnw + det*ve*vn)*inv
-            nn = (rod%mnn(i)*d - mnw*(mn + 2.0_wp*sn) + (t2*(t2*pee + 2.0_wp*pen) + tnn)*mww + det*vn*vn)*inv
+            ! P without o.
+            kk = pee*oo + det
+            ke = te*kk
+            kn = tn*kk
+            ee = rod%ee(i) + (te*ke - eo*(ce + se))*inv
+            en = rod%en(i) + (tn*ke - eo*cn - se*no)*inv
+            nn = rod%nn(i) + (tn*kn - no*(cn + sn))*inv
 
-            ! By A: W', f_e, and the acceleration of the outer node.
-            yielding = 1.0_wp/firm
-            ce = (me + se)*inv
-            cn = (mn + sn)*inv
-            arm = (mww - chord*mnw)*firm + ue*vn
-            along = [t1 - j1*ce, t2 - j1*cn]
-            across = [-chord*ce, arm*inv]
-            pull = yielding*(pee*along + pen*across)
-            along = along - mobility*pull
-            outward(of_turn + 2, k) = ce
-            outward(of_turn + 4, k) = cn
-            outward(of_pull + 2, k) = pull(1)
-            outward(of_pull + 4, k) = pull(2)
-            outward(of_along + 2, k) = along(1)
-            outward(of_along + 4, k) = along(2)
-            outward(of_across + 2, k) = across(1)
-            outward(of_across + 4, k) = across(2)
-
-            ! At rest, first without b, whose parts follow by the same T as those of A.
-            along_0 = -yielding*(pee*rod%pull(i) + pen*rod%fall(i))
-            across_0 = -yielding*(pen*rod%pull(i) + tnn*rod%fall(i))
-            turn = firm*inv*(rod%r0(i) - (j1*along_0 + chord*across_0))
-            me = rod%re(i) + t1*along_0 + (mew + yielding*se)*turn
-            mn = rod%rn(i) + (across_0*arm + along_0*((t2*mww - j1*mnw)*firm - un*vn))*inv + cn*rod%r0(i)
-            turn = turn - inv*(j1*be + chord*(firm*bn - mobility*pen*be))
-            pull_0 = j1*turn - rod%pull(i)
-            across_0 = chord*turn - rod%fall(i)
-            along_0 = pull_0
-            pull_0 = yielding*(pee*along_0 + pen*across_0 + be)
-            outward(of_turn, k) = turn
-            outward(of_pull, k) = pull_0
-            outward(of_along, k) = along_0 - mobility*pull_0
-            outward(of_across, k) = across_0
-            r = me + along(1)*be + across(1)*bn
-            bn = mn + along(2)*be + across(2)*bn
-            be = r
+            ! At rest: f and the outer node's acceleration along the rod at o = 0, and the row of o.
+            ce = ce*inv
+            cn = cn*inv
+            f = yielding*(be - pee*pull)
+            at_rest = pull + mobility*f
+            r = (bn + rod%ro(i)) + to*f - pen*at_rest
+            kept = yielding*(to - mobility*pen)
+            outer = -firm*inv*r
+            outward(of_outer, k) = outer
+            outward(of_outer + 2, k) = ce
+            outward(of_outer + 4, k) = cn
+            outward(of_along, k) = kept*outer - at_rest
+            outward(of_along + 2, k) = yielding*te - kept*ce
+            outward(of_along + 4, k) = yielding*tn - kept*cn
+            be = rod%re(i) + te*f - ce*r
+            bn = rod%rn(i) + tn*f - cn*r
          end associate
       end subroutine add_rod
 
       !> P and b in the axes of rod k - 1 (of the spacecraft for k = 1).
       subroutine turn_axes()
-         real(wp) :: cd, sd, r
+         real(wp) :: cd, sd, along, across, r
 
          cd = cosine(k)*cosine(k - 1) + sine(k)*sine(k - 1)
          sd = sine(k)*cosine(k - 1) - cosine(k)*sine(k - 1)
@@ -225,9 +209,11 @@ contains
          outward(of_sine, k) = sd
          trace = ee + nn
          det = ee*nn - en*en
-         pee = cd*cd*ee + sd*(sd*nn - 2.0_wp*cd*en)
-         pnn = cd*cd*nn + sd*(sd*ee + 2.0_wp*cd*en)
-         pen = cd*sd*(ee - nn) + (cd - sd)*(cd + sd)*en
+         along = cd*ee - sd*en
+         across = cd*en - sd*nn
+         pee = cd*along - sd*across
+         pen = sd*along + cd*across
+         pnn = sd*(sd*ee + cd*en) + cd*(sd*en + cd*nn)
          r = cd*be - sd*bn
          bn = sd*be + cd*bn
          be = r
@@ -244,21 +230,22 @@ contains
       real(wp), intent(inout) :: ae, an             !! in: of hinge 0, moving axes; out: of the tip, axes of rod n [m/s^2]
       real(wp), dimension(n), intent(out) :: phi_acceleration, alpha_acceleration, beta_acceleration
       integer :: k, i, group
-      real(wp) :: along, across, w_rate, pull
+      real(wp) :: along, across, w_rate, f
 
       do group = 1, (n - 1)/lanes + 1
          do i = 1, min(lanes, n - (group - 1)*lanes)
             k = (group - 1)*lanes + i
             along = outward(of_cosine, k)*ae + outward(of_sine, k)*an
             across = outward(of_cosine, k)*an - outward(of_sine, k)*ae
-            w_rate = outward(of_turn, k) - outward(of_turn + 2, k)*along - outward(of_turn + 4, k)*across
-            pull = outward(of_pull, k) + outward(of_pull + 2, k)*along + outward(of_pull + 4, k)*across
             ae = outward(of_along, k) + outward(of_along + 2, k)*along + outward(of_along + 4, k)*across
-            an = outward(of_across, k) + outward(of_across + 2, k)*along + outward(of_across + 4, k)*across
-            phi_acceleration(k) = w_rate - omega_rate
+            an = outward(of_outer, k) - outward(of_outer + 2, k)*along - outward(of_outer + 4, k)*across
+            f = outward(of_force, k)*ae + outward(of_force + 2, k)*an + outward(of_force + 4, k)
             associate (r => bent(group))
-               alpha_acceleration(k) = r%xa(i) + r%ya(i)*pull + r%za(i)*along - r%ga(i)*across - r%ha(i)*w_rate
-               beta_acceleration(k) = r%xb(i) + r%yb(i)*pull + r%zb(i)*along - r%gb(i)*across - r%hb(i)*w_rate
+               w_rate = r%per_chord(i)*((an + r%fall(i)) - across)
+               phi_acceleration(k) = w_rate - omega_rate
+               beta_acceleration(k) = r%xb(i) + r%yb(i)*f + r%zb(i)*along - r%gb(i)*across - r%hb(i)*w_rate
+               alpha_acceleration(k) = r%xa(i) + r%ya(i)*f + r%za(i)*along - r%ga(i)*across - r%ha(i)*w_rate - &
+                                       r%coupling(i)*beta_acceleration(k)
             end associate
          end do
       end do
