@@ -7,7 +7,8 @@ module test_run_file
    use rodyn_kinds, only: i8, wp
    use rodyn_posix, only: path_exists
    use rodyn_quantities, only: is_finite, layout_of, new_row, row_layout, row_type
-   use rodyn_run_file, only: check_output_path, run_file, run_header, solver_report
+   use rodyn_run_file, only: check_output_path, run_file, run_header
+   use rodyn_run_report, only: solver_report
    use test_hdf5_reader, only: has_set, read_attribute, read_set
    use test_scratch, only: clean, scratch_path
    use test_testing, only: check, check_close, new_test, unittest

@@ -24,10 +24,11 @@ ORDER = [
     {"input": "namelists read strictly and written; notes on what is probably unintended",
      "dynamics": "equations of motion: accelerations, events, energies, linearisation, equilibria, modes",
      "integration": "CVODE, ARKODE and our own methods"},
-    {"output": "HDF5 files of runs and modes; whether a run stayed where its model holds",
+    {"output": "runs and modes as HDF5 files and tables in memory; whether a run stayed where its model holds",
      "simulation": "a motion from start to end: choice of the method, stops at switches and events, ensembles in lanes"},
     {"sweep": "many cases over cores and clusters"},
     {"program": "the commands"},
+    {"interface": "the C interface of the shared library, in memory"},
 ]
 # These know less than stands below them: with base they are a library of integrators for any system of equations.
 ONLY = {"ode": {"base"}, "integration": {"base", "ode"}}

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import pathlib
 import re
+import subprocess
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
@@ -29,18 +30,24 @@ rule compile_c
 rule archive
   command = rm -f $out && ar rcs $out $in
   description = $out
+rule share
+  command = {compiler} {flags} -shared -o $out $in -Wl,--version-script=app/shared.map -Wl,-z,defs -Wl,--as-needed {libraries}
+  description = $out
 rule link
   command = {compiler} {flags} -o $out $in {libraries}
   description = $out
 """
-LESS = {("src", "rodyn", folder): "-O1" for folder in ("input", "output", "sweep", "program")}
+LESS = {("src", "rodyn", folder): "-O1" for folder in ("input", "output", "sweep", "program", "interface")}
 PROGRAMS = {"app/main.F90": "bin/rodyn", "test/main.f90": "test/tester", "test/sample_run.f90": "test/sample_run"}
+SHARED = ("app/shared.F90", "src/rodyn/interface/c_interface.f90") # what else it needs comes from the archive
 ARCHIVES = {"src": "lib/librodyn.a", "test": "objects/libtest.a"}
 
 
 def main() -> None:
     """Read the source files, and print."""
     stage, compiler, flags, libraries = sys.argv[1:]
+    if "--enable-default-pie" not in subprocess.run([compiler, "-v"], capture_output=True, text=True).stderr:
+        flags += " -fPIE" # or the shared library could not be made from the same objects
     print(RULES.format(stage=stage, compiler=compiler, flags=flags, libraries=libraries))
     paths = [path for pattern in ("src/**/*.f90", "app/*.F90", "test/*.f90") for path in sorted(ROOT.glob(pattern))]
     texts = {path.relative_to(ROOT): path.read_text() for path in paths}
@@ -62,8 +69,12 @@ def main() -> None:
         if str(path) in PROGRAMS:
             parts = [made, *in_c] if folder == "app" else [made, f"{stage}/{ARCHIVES['test']}"]
             print(f"build {stage}/{PROGRAMS[str(path)]}: link {' '.join(parts)} {stage}/{ARCHIVES['src']}")
-        else:
+        elif folder != "app":
             members[folder].append(made)
+    shared = " ".join(f"{stage}/objects/{path.replace('/', '_')}.o" for path in SHARED)
+    archive = f"{stage}/{ARCHIVES['src']}"
+    print(f"build {stage}/lib/librodyn.so: share {shared} {archive} | app/shared.map")
+    print(f"  objects = {shared}\n  archive = {archive}")
     for folder, objects in members.items():
         print(f"build {stage}/{ARCHIVES[folder]}: archive {' '.join(objects)}")
 

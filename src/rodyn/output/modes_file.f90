@@ -1,38 +1,24 @@
-!> The modes of a scene as an HDF5 file, docs/modes.md.
-!>
-!> Over (mode, rod), (mode) or (mode, joint): each coordinate of the shapes as two data sets, NAME_real and NAME_imag, since
-!> HDF5 has no complex numbers. Over (equation, rate) and (equation, coordinate): the matrices of the linear model.
+!> Modes as an HDF5 file: a table, array by array.
 module rodyn_modes_file
    use rodyn_errors, only: error_type
    use rodyn_kinds, only: wp
-   use rodyn_kinematics, only: slopes
-   use rodyn_linear_model, only: linear_model
-   use rodyn_modes, only: mode_set
-   use rodyn_result_file, only: provenance, result_file
-   use rodyn_hinge_law, only: hinge_law
-   use rodyn_scene, only: scene_type
-   use rodyn_text, only: to_text
+   use rodyn_result_file, only: result_file
+   use rodyn_result_table, only: result_array, result_table
+   use rodyn_run_report, only: provenance
    implicit none (type, external)
    private
    public :: write_modes
 
-   real(wp), parameter :: pi = acos(-1.0_wp)
-   integer, parameter :: name_length = 24
    integer, parameter :: compression = 4
 
 contains
 
    !> Write everything and give the file its name.
-   subroutine write_modes(path, force, origin, warnings, scene, hinges, model, modes, equilibrium, error)
+   subroutine write_modes(path, force, origin, table, error)
       character(len=*), intent(in) :: path
       logical, intent(in) :: force             !! replace an existing file
       type(provenance), intent(in) :: origin
-      character(len=*), intent(in) :: warnings !! where the model does not hold, one line each
-      type(scene_type), intent(in) :: scene
-      type(hinge_law), intent(in) :: hinges
-      type(linear_model), intent(in) :: model
-      type(mode_set), intent(in) :: modes      !! with shapes
-      logical, intent(in) :: equilibrium       !! the state was sought as one
+      type(result_table), intent(in) :: table
       type(error_type), allocatable, intent(out) :: error
       type(result_file) :: file
       integer :: i
@@ -40,266 +26,42 @@ contains
       call file%begin(path, force, error)
       if (allocated(error)) return
       call file%write_provenance(origin)
-      call write_axes()
-      call write_eigenvalues()
-      call write_shapes(file, scene, hinges, model, modes)
-      call write_state()
-      call write_matrices()
-      call write_summary()
+      do i = 1, table%n
+         call write_array(file, table%arrays(i))
+      end do
+      call file%put_attributes('/', table%attributes)
       call file%complete('done', error)
-
-   contains
-
-      subroutine write_axes()
-         call axis('mode', [(i, i=1, modes%n)], 'rigid bodies, mechanisms, oscillations, relaxations; each by rising frequency')
-         call axis('rod', [(i, i=1, scene%n)], 'rod, counted from the spacecraft')
-         call axis('hinge', [(i, i=0, scene%n - 1)], 'hinge, counted from the spacecraft')
-         if (size(scene%hinges%relaxing) > 0) &
-            call axis('joint', scene%hinges%relaxing, 'hinge whose rotation is a state, counted from the spacecraft')
-         call names('coordinate', kept_names(scene, model, .false.), &
-                    'coordinate, as its change; without angles that locked hinges make redundant')
-         call names('rate', kept_names(scene, model, .true.), 'rate; of the spacecraft along the turning axes')
-         call names('equation', kept_names(scene, model, .true.), 'balance of forces in the row of this rate')
-      end subroutine write_axes
-
-      subroutine axis(name, values, long_name)
-         character(len=*), intent(in) :: name, long_name
-         integer, contiguous, intent(in) :: values(:)
-         call file%file%write(name, values, compression)
-         call file%describe(name, '1', long_name)
-         call file%file%make_scale(name)
-      end subroutine axis
-
-      subroutine names(name, values, long_name)
-         character(len=*), intent(in) :: name, values(:), long_name
-         call file%file%create_texts(name, len(values), size(values), compression)
-         call file%file%append(name, values)
-         call file%file%put_attribute(name, 'long_name', long_name)
-         call file%file%make_scale(name)
-      end subroutine names
-
-      subroutine write_eigenvalues()
-         call per_mode('frequency', modes%frequency(), 'rad s-1', 'natural frequency, magnitude of the eigenvalue')
-         call per_mode('frequency_hz', modes%frequency()/(2.0_wp*pi), 'Hz', 'natural frequency in cycles')
-         call per_mode('frequency_damped', aimag(modes%eigenvalue), 'rad s-1', 'frequency of the motion, imaginary part')
-         call per_mode('damping_ratio', modes%damping_ratio(), '1', 'decay over natural frequency; -1 or 1 of relaxations')
-         call per_mode('decay', modes%decay(), 's-1', 'rate of decay, minus the real part; negative: it grows')
-         call file%file%create_texts('kind', len(modes%kind), modes%n, compression)
-         call file%file%append('kind', modes%kind)
-         call file%file%put_attribute('kind', 'long_name', 'rigid body, mechanism, oscillation or relaxation')
-         call file%file%attach_scale('kind', 1, 'mode')
-      end subroutine write_eigenvalues
-
-      subroutine per_mode(name, values, units, long_name)
-         character(len=*), intent(in) :: name, units, long_name
-         real(wp), contiguous, intent(in) :: values(:)
-         call write_vector(file, name, values, 'mode', units, long_name)
-      end subroutine per_mode
-
-      !> The state the equations are linearised about.
-      subroutine write_state()
-         call write_vector(file, 'state', model%q(model%kept), 'coordinate', 'm or rad', 'coordinates of the state')
-         call write_vector(file, 'state_rate', model%p(model%kept(:model%n)), 'rate', 'm s-1 or rad s-1', 'rates of the state')
-         call write_vector(file, 'state_acceleration', model%acceleration(model%kept(:model%n)), 'rate', &
-                           'm s-2 or rad s-2', 'rates of these rates')
-         call write_configuration(file, scene, hinges, model)
-      end subroutine write_state
-
-      subroutine write_matrices()
-         call matrix('mass_matrix', model%mass, 'rate', 'kg, kg m or kg m2', 'M of M dp'' + (D + G) dp + K dq = 0')
-         call matrix('damping_matrix', model%damping, 'rate', 'N s and N m s', 'D of the dampers in the hinges')
-         call matrix('gyroscopic_matrix', model%gyration, 'rate', 'N s and N m s', 'G of the velocities of the state')
-         call matrix('stiffness_matrix', model%stiffness, 'coordinate', 'N and N m', 'K, tangent stiffness')
-      end subroutine write_matrices
-
-      !> Rows of a Fortran matrix become rows in C and Python.
-      subroutine matrix(name, values, column, units, long_name)
-         character(len=*), intent(in) :: name, column, units, long_name
-         real(wp), contiguous, intent(in) :: values(:, :)
-         call write_table(file, name, transpose(values), column, 'equation', units, long_name)
-      end subroutine matrix
-
-      subroutine write_summary()
-         call file%file%put_attribute('/', 'warnings', warnings)
-         call file%file%put_attribute('/', 'at', trim(merge('equilibrium  ', 'initial state', equilibrium)))
-         call file%file%put_attribute('/', 'stable', all([(modes%is_stable(i), i=1, modes%n)]))
-         call file%file%put_attribute('/', 'conservative', modes%conservative)
-         call file%file%put_attribute('/', 'steady', model%is_steady(modes%fastest))
-      end subroutine write_summary
-
    end subroutine write_modes
 
-   !> All of the state, with what locked hinges make redundant, slopes without inertia, and the hinges.
-   subroutine write_configuration(file, scene, hinges, model)
+   !> One data set, over the scales that have been written before; one that is over itself becomes a scale.
+   subroutine write_array(file, array)
       type(result_file), intent(inout) :: file
-      type(scene_type), intent(in) :: scene
-      type(hinge_law), intent(in) :: hinges
-      type(linear_model), intent(in) :: model
-      real(wp), dimension(scene%n) :: alpha, beta, alpha_rate, beta_rate
+      type(result_array), intent(in), target :: array
+      character(len=:), allocatable :: name
+      real(wp), pointer :: matrix(:, :)
 
-      call slopes(scene, hinges, model%q, model%p, alpha, beta, alpha_rate, beta_rate)
-      if (scene%n_base > 0) then
-         call file%file%put_attribute('/', 'state_displacement_x', model%q(1))
-         call file%file%put_attribute('/', 'state_displacement_y', model%q(2))
-         call file%file%put_attribute('/', 'state_rotation', model%q(3))
-      end if
-      call per_rod('state_phi', model%q(scene%phi_at() + 1:scene%phi_at() + scene%n), 'rad', 'chord angle of the state')
-      call per_rod('state_alpha', alpha, 'rad', 'slope of the rod at its inner end')
-      call per_rod('state_beta', beta, 'rad', 'slope of the rod at its outer end')
-      if (scene%n_bend == 3) call per_rod('state_bubble', model%q(scene%bend_at(3) + 1:scene%bend_at(3) + scene%n), 'm', &
-                                          'deflection by the third bending shape')
-      call write_vector(file, 'state_hinge_angle', model%hinge_angle, 'hinge', 'rad', 'rotation of the hinge')
-      call write_vector(file, 'state_hinge_moment', model%hinge_moment, 'hinge', 'N m', &
-                        'moment in the hinge, on its inner body; that of a locked hinge holds it')
-
-   contains
-
-      subroutine per_rod(name, values, units, long_name)
-         character(len=*), intent(in) :: name, units, long_name
-         real(wp), contiguous, intent(in) :: values(:)
-         call write_vector(file, name, values, 'rod', units, long_name)
-      end subroutine per_rod
-
-   end subroutine write_configuration
-
-   !> Names of the coordinates that are kept, or of their rates.
-   function kept_names(scene, model, rates) result(names)
-      type(scene_type), intent(in) :: scene
-      type(linear_model), intent(in) :: model
-      logical, intent(in) :: rates
-      character(len=name_length), allocatable :: names(:)
-      names = coordinate_names(scene, rates)
-      if (rates) then
-         names = names(model%kept(:model%n))
+      name = trim(array%name)
+      if (allocated(array%texts)) then
+         call file%file%create_texts(name, array%text_length, size(array%texts), compression)
+         call file%file%append(name, array%texts(:)(:array%text_length))
+      else if (allocated(array%integers)) then
+         call file%file%write(name, array%integers, compression)
+      else if (array%dims(2) == '') then
+         call file%file%write(name, array%reals, compression)
       else
-         names = names(model%kept)
+         matrix(1:array%shape(2), 1:array%shape(1)) => array%reals
+         call file%file%write(name, matrix, compression)
       end if
-   end function kept_names
-
-   !> 'displacement_x', ..., 'phi_1', ... or those of the rates.
-   function coordinate_names(scene, rates) result(names)
-      type(scene_type), intent(in) :: scene
-      logical, intent(in) :: rates
-      character(len=name_length), allocatable :: names(:)
-      integer :: i, at
-
-      allocate (names(merge(scene%n_dof, scene%n_q, rates)))
-      if (scene%n_base > 0 .and. rates) names(:3) = [character(len=name_length) :: 'velocity_x', 'velocity_y', 'omega']
-      if (scene%n_base > 0 .and. .not. rates) &
-         names(:3) = [character(len=name_length) :: 'displacement_x', 'displacement_y', 'rotation']
-      at = scene%n_base
-      call add('phi')
-      if (scene%dynamic_bending) call add('alpha')
-      if (scene%dynamic_bending) call add('beta')
-      if (scene%n_bend == 3) call add('bubble')
-      do i = scene%n_dof + 1, size(names)
-         names(i) = 'joint_'//to_text(scene%hinges%relaxing(i - scene%n_dof))
-      end do
-
-   contains
-
-      subroutine add(name)
-         character(len=*), intent(in) :: name
-         character(len=5) :: ending
-         ending = ''
-         if (rates) ending = '_rate'
-         do i = 1, scene%n
-            names(at + i) = name//trim(ending)//'_'//to_text(i)
-         end do
-         at = at + scene%n
-      end subroutine add
-
-   end function coordinate_names
-
-   !> The shapes, one coordinate after the other; what the scene has not is zero, and slopes without inertia follow.
-   subroutine write_shapes(file, scene, hinges, model, modes)
-      type(result_file), intent(inout) :: file
-      type(scene_type), intent(in) :: scene
-      type(hinge_law), intent(in) :: hinges
-      type(linear_model), intent(in) :: model
-      type(mode_set), intent(in) :: modes
-      complex(wp), allocatable :: place(:, :), phi(:, :), alpha(:, :), beta(:, :)
-      integer :: i
-
-      allocate (place(modes%n, 3), source=(0.0_wp, 0.0_wp))
-      if (scene%n_base > 0) place = transpose(modes%shape(:3, :))
-      allocate (alpha(scene%n, modes%n), beta(scene%n, modes%n))
-      do i = 1, modes%n
-         call slope_shapes(scene, hinges, size(model%p), modes%shape(:, i), alpha(:, i), beta(:, i))
-      end do
-      call scalar('displacement_x', place(:, 1), 'm', 'displacement of the spacecraft, moving x axis')
-      call scalar('displacement_y', place(:, 2), 'm', 'displacement of the spacecraft, moving y axis')
-      call scalar('rotation', place(:, 3), 'rad', 'rotation of the spacecraft')
-      phi = modes%shape(scene%phi_at() + 1:scene%phi_at() + scene%n, :)
-      call table('phi', phi, 'rod', 'angle from the moving x axis to the chord of the rod')
-      call table('alpha', alpha, 'rod', 'slope of the rod against its chord at the inner end')
-      call table('beta', beta, 'rod', 'slope of the rod against its chord at the outer end')
-      if (scene%n_bend == 3) call table('bubble', modes%shape(scene%bend_at(3) + 1:scene%bend_at(3) + scene%n, :), 'rod', &
-                                        'deflection by the third bending shape in the middle of the rod', 'm')
-      if (scene%n_q > scene%n_dof) call table('joint_rotation', modes%shape(scene%n_dof + 1:, :), 'joint', &
-                                             'rotation of the hinge, a state of its own')
-
-   contains
-
-      subroutine scalar(name, x, units, long_name)
-         character(len=*), intent(in) :: name, units, long_name
-         complex(wp), contiguous, intent(in) :: x(:)
-         call write_vector(file, name//'_real', real(x, wp), 'mode', units, long_name//', real part of the shape')
-         call write_vector(file, name//'_imag', aimag(x), 'mode', units, long_name//', imaginary part of the shape')
-      end subroutine scalar
-
-      subroutine table(name, x, scale, long_name, units)
-         character(len=*), intent(in) :: name, scale, long_name
-         complex(wp), contiguous, intent(in) :: x(:, :)
-         character(len=*), intent(in), optional :: units !! absent: 'rad'
-         character(len=:), allocatable :: unit
-         unit = 'rad'
-         if (present(units)) unit = units
-         call write_table(file, name//'_real', real(x, wp), scale, 'mode', unit, long_name//', real part of the shape')
-         call write_table(file, name//'_imag', aimag(x), scale, 'mode', unit, long_name//', imaginary part of the shape')
-      end subroutine table
-
-   end subroutine write_shapes
-
-   !> A data set over one scale.
-   subroutine write_vector(file, name, values, scale, units, long_name)
-      type(result_file), intent(inout) :: file
-      character(len=*), intent(in) :: name, scale, units, long_name
-      real(wp), contiguous, intent(in) :: values(:)
-
-      call file%file%write(name, values, compression)
-      call file%describe(name, units, long_name)
-      call file%file%attach_scale(name, 1, scale)
-   end subroutine write_vector
-
-   !> The same over two, the one that runs fastest first.
-   subroutine write_table(file, name, values, fast_scale, slow_scale, units, long_name)
-      type(result_file), intent(inout) :: file
-      character(len=*), intent(in) :: name, fast_scale, slow_scale, units, long_name
-      real(wp), contiguous, intent(in) :: values(:, :)
-
-      call file%file%write(name, values, compression)
-      call file%describe(name, units, long_name)
-      call file%file%attach_scale(name, 1, fast_scale)
-      call file%file%attach_scale(name, 2, slow_scale)
-   end subroutine write_table
-
-   !> Slopes that go with a change of q: they are affine in it.
-   subroutine slope_shapes(scene, hinges, n_p, shape, alpha, beta)
-      type(scene_type), intent(in) :: scene
-      type(hinge_law), intent(in) :: hinges
-      integer, intent(in) :: n_p
-      complex(wp), intent(in) :: shape(:)
-      complex(wp), intent(out) :: alpha(:), beta(:)
-      real(wp), dimension(scene%n, 3) :: a, b
-      real(wp) :: rates(n_p), unused(scene%n), also_unused(scene%n)
-
-      rates = 0.0_wp
-      call slopes(scene, hinges, spread(0.0_wp, 1, size(shape)), rates, a(:, 3), b(:, 3), unused, also_unused)
-      call slopes(scene, hinges, real(shape, wp), rates, a(:, 1), b(:, 1), unused, also_unused)
-      call slopes(scene, hinges, aimag(shape), rates, a(:, 2), b(:, 2), unused, also_unused)
-      alpha = cmplx(a(:, 1) - a(:, 3), a(:, 2) - a(:, 3), wp)
-      beta = cmplx(b(:, 1) - b(:, 3), b(:, 2) - b(:, 3), wp)
-   end subroutine slope_shapes
+      if (len(array%units) > 0) call file%file%put_attribute(name, 'units', array%units)
+      call file%file%put_attribute(name, 'long_name', array%long_name)
+      if (array%dims(1) == array%name) then
+         call file%file%make_scale(name)
+      else if (array%dims(2) == '') then
+         call file%file%attach_scale(name, 1, trim(array%dims(1)))
+      else
+         call file%file%attach_scale(name, 1, trim(array%dims(2)))
+         call file%file%attach_scale(name, 2, trim(array%dims(1)))
+      end if
+   end subroutine write_array
 
 end module rodyn_modes_file

@@ -1,32 +1,23 @@
-!> A result on its way to the disk, and what every result says of its origin.
+!> A result on its way to the disk.
 !>
 !> Until `complete` has put everything onto the disk, the file has a temporary name, `PATH.partial-PID`: whatever has the
 !> final name is complete. What is about to be written is reserved before: a file that has been flushed stays sound.
 module rodyn_result_file
    use, intrinsic :: iso_c_binding, only: c_int
-   use rodyn_build_info, only: compiler, compiler_options, git_commit, program_version
+   use rodyn_attributes, only: attribute_list, is_text, is_real, is_int32
    use rodyn_errors, only: error_type, exit_bad_input, raise
    use rodyn_file_room, only: file_room
    use rodyn_hdf5_files, only: hdf5_file, hdf5_version
    use rodyn_kinds, only: i8
-   use rodyn_posix, only: host_name, ignore_signal, is_directory, is_special, is_writable, last_failure, parent_directory, &
-      path_exists, posix_close, process_id, remove_file, rename_new, rename_over, sigxfsz, sync_path, utc_now
+   use rodyn_posix, only: ignore_signal, is_directory, is_special, is_writable, last_failure, parent_directory, &
+      path_exists, posix_close, process_id, remove_file, rename_new, rename_over, sigxfsz, sync_path
    use rodyn_posix_files, only: create_file, make_directory
-   use rodyn_text, only: text_or_empty
+   use rodyn_run_report, only: provenance
    implicit none (type, external)
    private
-   public :: provenance, result_file, check_output_path
+   public :: result_file, check_output_path
 
    integer, parameter :: longest_name = 255 - 24, longest_path = 4095 - 24 !! of Linux, less what temporary names add [bytes]
-
-   !> What a result is the result of.
-   type :: provenance
-      character(len=:), allocatable :: title
-      character(len=:), allocatable :: input            !! the namelist as read
-      character(len=:), allocatable :: resolved_input   !! every key with the value used
-      character(len=:), allocatable :: notes            !! what to know about the model, one line each
-      character(len=:), allocatable :: sundials_version
-   end type provenance
 
    !> An HDF5 file under its temporary name.
    type :: result_file
@@ -40,6 +31,7 @@ module rodyn_result_file
       procedure :: begin
       procedure :: reserve
       procedure :: write_provenance
+      procedure :: put_attributes
       procedure :: describe
       procedure :: complete
       procedure :: discard
@@ -112,30 +104,29 @@ contains
    !> Root attributes: what ran, with what, on what.
    subroutine write_provenance(self, origin)
       class(result_file), intent(inout) :: self
-      type(provenance), intent(in) :: origin
-
-      call put('title', text_or_empty(origin%title))
-      call put('status', 'running')
-      call put('program_version', program_version)
-      call put('git_commit', git_commit())
-      call put('compiler', compiler())
-      call put('compiler_options', compiler_options())
-      call put('sundials_version', text_or_empty(origin%sundials_version))
-      call put('hdf5_version', hdf5_version())
-      call put('hostname', host_name())
-      call put('created', utc_now())
-      call put('input', text_or_empty(origin%input))
-      call put('resolved_input', text_or_empty(origin%resolved_input))
-      call put('notes', text_or_empty(origin%notes))
-
-   contains
-
-      subroutine put(name, value)
-         character(len=*), intent(in) :: name, value
-         call self%file%put_attribute('/', name, value)
-      end subroutine put
-
+      class(provenance), intent(in) :: origin
+      type(attribute_list) :: attributes
+      call origin%list('running', attributes, hdf5_version())
+      call self%put_attributes('/', attributes)
    end subroutine write_provenance
+
+   subroutine put_attributes(self, object, attributes)
+      class(result_file), intent(inout) :: self
+      character(len=*), intent(in) :: object !! '/' for the root
+      type(attribute_list), intent(in) :: attributes
+      integer :: i
+
+      do i = 1, attributes%n
+         associate (x => attributes%items(i))
+            select case (x%kind)
+            case (is_text); call self%file%put_attribute(object, x%name, x%text)
+            case (is_real); call self%file%put_attribute(object, x%name, x%x)
+            case (is_int32); call self%file%put_attribute(object, x%name, int(x%number))
+            case default; call self%file%put_attribute(object, x%name, x%number)
+            end select
+         end associate
+      end do
+   end subroutine put_attributes
 
    !> Unit and meaning of a data set.
    subroutine describe(self, name, units, long_name)

@@ -11,19 +11,19 @@
 !> within HDF5 the file is left as it is, and every later call returns that failure again, so that the caller may end its work in
 !> the usual way.
 module rodyn_run_file
+   use rodyn_attributes, only: attribute_list
    use rodyn_build_info, only: git_commit
    use rodyn_errors, only: error_type, raise
    use rodyn_hdf5_files, only: hdf5_file
-   use rodyn_integrator, only: solver_statistics
    use rodyn_kinds, only: i8, wp
-   use rodyn_methods, only: solver_options
    use rodyn_posix, only: path_exists, remove_file
    use rodyn_quantities, only: chain_axes, entries, row_layout, row_type
-   use rodyn_result_file, only: check_output_path, provenance, result_file
+   use rodyn_result_file, only: check_output_path, result_file
+   use rodyn_run_report, only: event_columns, provenance, solver_report
    use rodyn_text, only: short_text, text_or_empty, to_text
    implicit none (type, external)
    private
-   public :: run_file, run_header, solver_report, check_output_path
+   public :: run_file, run_header, check_output_path
 
    character(len=*), parameter :: solver_group = 'solver', events_group = 'events'
 
@@ -49,18 +49,6 @@ module rodyn_run_file
       integer :: compression = 4  !! gzip level, 0..9
    end type run_header
 
-   !> What the integrator did; the attributes of the group `solver`.
-   type, extends(solver_statistics) :: solver_report
-      character(len=:), allocatable :: method     !! those used
-      character(len=:), allocatable :: reason     !! why it was chosen
-      character(len=:), allocatable :: kernel     !! 'recursive' or 'assembled'
-      type(solver_options) :: options             !! of the case
-      real(wp) :: work_external_error = 0.0_wp     !! estimated, at the end of the run [J]; with the ledger
-      real(wp) :: energy_dissipated_error = 0.0_wp !! likewise [J]
-      real(wp) :: wall_seconds = 0.0_wp
-      character(len=:), allocatable :: warnings   !! where the model does not hold, one line each; a root attribute
-   end type solver_report
-
    type, extends(result_file) :: run_file
       type(row_layout), private :: layout
       integer, private :: block_rows = 0
@@ -84,7 +72,6 @@ module rodyn_run_file
       procedure, private :: check_open
       procedure, private :: keep_failure
       procedure, private :: write_layout
-      procedure, private :: write_solver_report
       procedure, private :: flush_is_due
       procedure, private :: write_waiting_rows
       procedure, private :: write_rows
@@ -234,11 +221,6 @@ contains
       character(len=*), intent(in) :: kind(:)
       real(wp), intent(in) :: energy_lost(:)   !! [J]
       type(error_type), allocatable, intent(out) :: error
-      character(len=*), parameter :: names(4) = [character(len=18) :: 'events/time', 'events/hinge', 'events/kind', &
-         'events/energy_lost']
-      character(len=*), parameter :: units(4) = [character(len=2) :: 's', '1', '1', 'J']
-      character(len=*), parameter :: meanings(4) = [character(len=48) :: 'time of the event', &
-         'hinge, counted from the spacecraft', 'what happened', 'mechanical energy lost in it']
       character(len=:), allocatable :: failure
       integer :: i
 
@@ -247,7 +229,7 @@ contains
       call self%write_waiting_rows(error)
       if (.not. self%file%is_open()) return
       if (allocated(error)) deallocate (error) ! no room, which `finish` reports
-      failure = self%reserve(bytes_at_end + size(names)*(bytes_of_layout + bytes_of_node) + size(time)*bytes_per_event)
+      failure = self%reserve(bytes_at_end + size(event_columns)*(bytes_of_layout + bytes_of_node) + size(time)*bytes_per_event)
       if (len(failure) > 0) then
          if (.not. allocated(self%no_room)) self%no_room = 'events cannot be written: '//failure
          return
@@ -259,9 +241,11 @@ contains
       call self%file%create_texts('events/kind', len(kind), max(1, size(kind)), 0)
       call self%file%append('events/kind', kind)
       call self%file%write('events/energy_lost', energy_lost, 0)
-      do i = 1, size(names)
-         call self%describe(trim(names(i)), trim(units(i)), trim(meanings(i)))
-         if (i > 1) call self%file%attach_scale(trim(names(i)), 1, 'events/time')
+      do i = 1, size(event_columns)
+         associate (x => event_columns(i))
+            call self%describe('events/'//trim(x%name), x%units, trim(x%long_name))
+            if (i > 1) call self%file%attach_scale('events/'//trim(x%name), 1, 'events/time')
+         end associate
       end do
       call self%file%get_failure(error)
       if (allocated(error)) call self%keep_failure(error)
@@ -275,6 +259,7 @@ contains
       type(solver_report), intent(in) :: report
       type(error_type), allocatable, intent(out) :: error
       character(len=*), intent(in), optional :: message  !! why it is not done
+      type(attribute_list) :: attributes
       character(len=:), allocatable :: outcome, reason, warnings
 
       call self%check_open(error)
@@ -294,7 +279,8 @@ contains
       if (outcome == 'failed' .and. self%force) call step_aside(self%path)
       warnings = text_or_empty(report%warnings)
       if (len(self%reserve(bytes_at_end + len(warnings))) > 0) warnings = 'left out: no space left'
-      call self%write_solver_report(report)
+      call report%list(self%layout%before('work_external') >= 0, attributes)
+      call self%put_attributes(solver_group, attributes)
       call self%file%put_attribute('/', 't_reached', self%last_time)
       call self%file%put_attribute('/', 'warnings', warnings)
       if (outcome /= 'done') call self%file%put_attribute('/', 'message', reason)
@@ -344,33 +330,6 @@ contains
       end do
       call self%file%create_group(solver_group)
    end subroutine write_layout
-
-   !> The attributes of the group `solver`.
-   subroutine write_solver_report(self, report)
-      class(run_file), intent(inout) :: self
-      type(solver_report), intent(in) :: report
-
-      call self%file%put_attribute(solver_group, 'method', text_or_empty(report%method))
-      call self%file%put_attribute(solver_group, 'reason', text_or_empty(report%reason))
-      call self%file%put_attribute(solver_group, 'kernel', text_or_empty(report%kernel))
-      call self%file%put_attribute(solver_group, 'order', report%options%order)
-      call self%file%put_attribute(solver_group, 'rtol', report%options%rtol)
-      call self%file%put_attribute(solver_group, 'atol', report%options%atol)
-      call self%file%put_attribute(solver_group, 'max_step', report%options%max_step)
-      call self%file%put_attribute(solver_group, 'fixed_step', report%options%fixed_step)
-      call self%file%put_attribute(solver_group, 'last_step', report%last_step)
-      call self%file%put_attribute(solver_group, 'n_steps', report%n_steps)
-      call self%file%put_attribute(solver_group, 'n_rhs', report%n_rhs)
-      call self%file%put_attribute(solver_group, 'n_jac', report%n_jac)
-      call self%file%put_attribute(solver_group, 'n_nonlinear_failures', report%n_nonlinear_failures)
-      call self%file%put_attribute(solver_group, 'n_error_test_failures', report%n_error_test_failures)
-      call self%file%put_attribute(solver_group, 'n_restarts', max(0_i8, report%n_starts - 1_i8))
-      if (self%layout%before('work_external') >= 0) then
-         call self%file%put_attribute(solver_group, 'work_external_error', report%work_external_error)
-         call self%file%put_attribute(solver_group, 'energy_dissipated_error', report%energy_dissipated_error)
-      end if
-      call self%file%put_attribute(solver_group, 'wall_seconds', report%wall_seconds)
-   end subroutine write_solver_report
 
    !> Write the rows that wait, as far as there is room for them. Those that find none are dropped.
    subroutine write_waiting_rows(self, error)

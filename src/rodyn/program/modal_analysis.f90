@@ -3,22 +3,16 @@ module rodyn_modal_analysis
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: case_config
    use rodyn_case_check, only: sound_case
-   use rodyn_case_notes, only: case_notes
-   use rodyn_case_reader, only: resolved_case
    use rodyn_errors, only: error_type
-   use rodyn_integrators, only: sundials_version
    use rodyn_linear_model, only: linear_model
    use rodyn_modes, only: mode_set, rigid_body, mechanism, relaxation
-   use rodyn_modes_at_start, only: modes_at_start
    use rodyn_modes_file, only: write_modes
-   use rodyn_notes, only: notes_on
-   use rodyn_quantities, only: layout_of
-   use rodyn_result_file, only: check_output_path, provenance
-   use rodyn_run_needs, only: check_memory, memory_of_scene, of_program
-   use rodyn_run_setup, only: run_setup, new_run_setup
+   use rodyn_modes_of_case, only: modes_of_case
+   use rodyn_result_file, only: check_output_path
+   use rodyn_result_table, only: result_table
+   use rodyn_run_report, only: provenance
    use rodyn_terminal, only: print_line
-   use rodyn_text, only: formatted, joined, to_text
-   use rodyn_validity, only: validity_type, new_validity
+   use rodyn_text, only: formatted, to_text
    implicit none (type, external)
    private
    public :: analyse_modes
@@ -39,11 +33,11 @@ contains
       logical, intent(in), optional :: force               !! replace an existing file
       logical, intent(in), optional :: quiet               !! print nothing
       type(case_config) :: config !! with what is not given
-      type(run_setup) :: setup
       type(linear_model) :: model
       type(mode_set) :: modes
+      type(result_table) :: table
       type(provenance) :: origin
-      type(validity_type) :: validity
+      character(len=:), allocatable :: warnings
       logical :: silent, replace
 
       silent = .false.
@@ -52,27 +46,15 @@ contains
       if (present(force)) replace = force
       call check_output_path(path, replace, error)
       if (.not. allocated(error)) call sound_case(given, config, error)
-      if (.not. allocated(error)) call check_memory('n_rods = '//to_text(config%chain%n_rods), &
-                                                    of_program + memory_of_scene(config), error)
-      if (.not. allocated(error)) call new_run_setup(setup, config, .false., error)
-      if (.not. allocated(error)) call modes_at_start(setup%motion, config, equilibrium, loads, .true., model, modes, error)
+      if (.not. allocated(error)) call modes_of_case(config, equilibrium, loads, model, modes, table, origin, warnings, error)
       if (allocated(error)) return
-      origin%title = ''
-      if (allocated(config%title)) origin%title = config%title
-      origin%resolved_input = resolved_case(config)
-      origin%sundials_version = sundials_version()
       if (present(input_text)) origin%input = input_text
-      associate (scene => setup%motion%dynamics%scene, hinges => setup%motion%dynamics%hinges)
-         validity = new_validity(scene, layout_of(config), 1, config%model%deflection_limit, config%model%axial_error_limit)
-         call validity%judge_forces(setup%motion%dynamics, 0.0_wp, model%q, model%p, model%acceleration)
-         origin%notes = joined(case_notes(config, .false.), notes_on(scene, hinges, model%q(:scene%n_dof), .false.), new_line('a'))
-         call write_modes(path, replace, origin, validity%warnings(), scene, hinges, model, modes, equilibrium, error)
-      end associate
+      call write_modes(path, replace, origin, table, error)
       if (allocated(error) .or. silent) return
       call print_table(modes)
       if (.not. equilibrium .and. .not. model%is_steady(modes%fastest)) call print_line(&
          'note    the initial state is no equilibrium: these are the modes of its equations held at t = 0; see --equilibrium')
-      if (len(validity%warnings()) > 0) call print_line('warning '//validity%warnings())
+      if (len(warnings) > 0) call print_line('warning '//warnings)
       call print_line('file    '//path)
    end subroutine analyse_modes
 

@@ -3,48 +3,39 @@ module rodyn_run
    use rodyn_kinds, only: wp, i8
    use rodyn_terminal, only: print_line
    use rodyn_text, only: formatted, joined, text_or_empty, time_text, to_text, with_line_ends
-   use rodyn_errors, only: error_type, raise, exit_stopped
+   use rodyn_errors, only: error_type, exit_stopped
    use rodyn_case_config, only: case_config
    use rodyn_case_check, only: sound_case
    use rodyn_case_notes, only: case_notes
    use rodyn_case_reader, only: resolved_case
-   use rodyn_motion, only: motion_type, state_invariants
-   use rodyn_kinematics, only: invariants_type
+   use rodyn_motion, only: motion_type
    use rodyn_integrator, only: solver_statistics
    use rodyn_integrators, only: sundials_version
    use rodyn_lapack, only: use_one_thread
    use rodyn_driver, only: driver_type, new_driver
-   use rodyn_simulation, only: observer_type, even_times, simulate
-   use rodyn_quantities, only: row_type, fill_row, is_finite, layout_of, new_row
+   use rodyn_recorder, only: recorder_type
+   use rodyn_simulation, only: even_times, simulate
+   use rodyn_quantities, only: layout_of
    use rodyn_run_needs, only: check_needs
    use rodyn_run_setup, only: run_setup, new_run_setup
-   use rodyn_run_file, only: run_file, run_header, solver_report, check_output_path
+   use rodyn_run_file, only: run_file, run_header, check_output_path
+   use rodyn_run_report, only: solver_report
    use rodyn_progress, only: progress_monitor, new_progress
    use rodyn_description, only: describe_scene
    use rodyn_notes, only: notes_on
    use rodyn_hinge_mechanism, only: kind_names
    use rodyn_user_load, only: user_load
    use rodyn_step_limit, only: check_fixed_step
-   use rodyn_validity, only: validity_type, interval_of_rows, new_validity
    implicit none (type, external)
    private
    public :: run_case, check_steps
 
-   integer, parameter :: most_judgements = 500 !! of axial forces, about: 1 % of what as many rows cost to write
-
    !> Writes rows into the run file.
-   type, extends(observer_type) :: recorder_type
+   type, extends(recorder_type) :: file_recorder
       type(run_file) :: file
-      type(row_type) :: row
-      real(wp) :: initial_energy = 0.0_wp !! kinetic + elastic at t = 0 [J]
-      logical :: started = .false.
-      integer :: kinetic = 0, elastic = 0, residual = 0 !! places of energies in the row; 0: no ledger
-      real(wp) :: worst_residual = 0.0_wp !! of the ledger [J]
-      real(wp) :: energy_scale = 0.0_wp   !! largest energy so far [J]
-      type(validity_type) :: validity
    contains
-      procedure :: observe
-   end type recorder_type
+      procedure :: keep
+   end type file_recorder
 
 contains
 
@@ -63,7 +54,7 @@ contains
       character(len=*), intent(in), optional :: name       !! of the case, for what is refused of its keys
       type(case_config) :: config !! with what is not given
       type(run_setup), target :: setup
-      type(recorder_type) :: recorder
+      type(file_recorder) :: recorder
       type(driver_type) :: driver
       type(progress_monitor), target :: progress
       type(error_type), allocatable :: failure
@@ -128,7 +119,7 @@ contains
 
    !> Create the file.
    subroutine begin_file(recorder, motion, config, path, replace, notes, error, input_text)
-      type(recorder_type), intent(inout) :: recorder
+      type(file_recorder), intent(inout) :: recorder
       type(motion_type), intent(in) :: motion
       type(case_config), intent(in) :: config
       character(len=*), intent(in) :: path
@@ -149,48 +140,20 @@ contains
       header%compression = config%output%compression
       call recorder%file%create(path, header, replace, error)
       if (allocated(error)) return
-      recorder%row = new_row(header%layout)
-      recorder%kinetic = header%layout%before('energy_kinetic') + 1
-      recorder%elastic = header%layout%before('energy_elastic') + 1
-      recorder%residual = header%layout%before('energy_residual') + 1
-      recorder%validity = new_validity(motion%dynamics%scene, header%layout, interval_of_rows(header%n_rows, most_judgements), &
-                                       config%model%deflection_limit, config%model%axial_error_limit)
+      call recorder%prepare(motion%dynamics%scene, header%layout, header%n_rows, config%model)
    end subroutine begin_file
 
    !> Write one row.
-   subroutine observe(self, motion, t, y, error)
-      class(recorder_type), intent(inout) :: self
-      type(motion_type), intent(inout) :: motion
-      real(wp), intent(in) :: t
-      real(wp), intent(in) :: y(:)
+   subroutine keep(self, error)
+      class(file_recorder), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
-      type(invariants_type) :: start
-
-      if (.not. self%started .and. motion%ledger) then
-         start = state_invariants(motion, y)
-         self%initial_energy = start%kinetic + start%elastic
-      end if
-      self%started = .true.
-      call fill_row(motion, t, y, self%initial_energy, self%row)
-      if (.not. is_finite(self%row)) then
-         call raise(error, 'at t = '//time_text(t)//' s: states or energies overflow')
-         return
-      end if
-      if (self%residual > 0) then
-         associate (x => self%row%values)
-            self%worst_residual = max(self%worst_residual, abs(x(self%residual)))
-            self%energy_scale = max(self%energy_scale, x(self%kinetic) + x(self%elastic))
-         end associate
-      end if
-      call self%validity%observe(self%row)
-      call self%validity%observe_forces(motion, t, y)
       call self%file%append(self%row, error)
-   end subroutine observe
+   end subroutine keep
 
    !> Events, attributes and the final name, whatever has ended the run: one that was stopped may step aside, or yield to an earlier
    !> one that has more rows.
    subroutine end_file(recorder, driver, motion, config, path, may_resume, seconds, failure, earlier, error)
-      type(recorder_type), intent(inout) :: recorder
+      type(file_recorder), intent(inout) :: recorder
       type(driver_type), intent(inout) :: driver
       type(motion_type), intent(in) :: motion
       type(case_config), intent(in) :: config
@@ -215,7 +178,7 @@ contains
 
    !> Attributes of the solver, status, and the final name.
    subroutine close_file(recorder, driver, motion, config, failure, seconds, error)
-      type(recorder_type), intent(inout) :: recorder
+      type(file_recorder), intent(inout) :: recorder
       type(driver_type), intent(inout) :: driver
       type(motion_type), intent(in) :: motion
       type(case_config), intent(in) :: config
@@ -224,17 +187,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(solver_report) :: report
 
-      report%solver_statistics = driver%statistics()
-      report%method = driver%methods()
-      report%reason = driver%reason()
-      report%kernel = trim(merge('assembled', 'recursive', motion%dynamics%scene%assembled))
-      report%options = config%solver%solver_options
-      if (motion%ledger) then
-         report%work_external_error = motion%quadrature_error(1)
-         report%energy_dissipated_error = motion%quadrature_error(2)
-      end if
-      report%wall_seconds = seconds
-      report%warnings = recorder%validity%warnings()
+      call recorder%make_report(driver, motion, config, seconds, report)
       if (.not. allocated(failure)) then
          call recorder%file%finish('done', report, error)
       else if (failure%exit_code == exit_stopped) then
@@ -285,7 +238,7 @@ contains
    !> Last lines on the terminal.
    subroutine print_result(driver, recorder, motion, t, seconds, failure)
       type(driver_type), intent(inout) :: driver
-      type(recorder_type), intent(in) :: recorder
+      type(file_recorder), intent(in) :: recorder
       type(motion_type), intent(in) :: motion
       real(wp), intent(in) :: t, seconds
       type(error_type), allocatable, intent(in) :: failure !! why the run ended early
