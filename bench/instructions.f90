@@ -4,7 +4,8 @@
 !>
 !> KIND is rhs, rhs_inextensible, rhs_rigid, rhs_lumped (rigid rods), rhs_quasistatic (lumped), rhs_condensed, lanes,
 !> lanes_inextensible (eight right-hand sides), or run_dop853, run_gauss, run_adams, run_bdf (0.02 s of the article's table 1),
-!> which print the number of their right-hand sides. The instructions of one are the difference between two TIMES (`instructions/guard.py`).
+!> which print the number of their right-hand sides. The instructions of one are the difference between two TIMES
+!> (`instructions/guard.py`).
 program bench_instructions
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type

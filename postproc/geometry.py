@@ -38,11 +38,14 @@ class Place:
         self.keeps_arc = run.group("model").get("formulation") == "inextensible" and run.group("model").get("bending") == "dynamic"
         self.outline = body_outline(run)
 
+    def chord(self, alpha: np.ndarray, beta: np.ndarray, bubble: np.ndarray | float = 0.0) -> np.ndarray:
+        """Lengths of the chords, (..., n)."""
+        return self.length - foreshortening(self.length, alpha, beta, bubble) if self.keeps_arc else self.length
+
     def shape(self, state: dict[str, np.ndarray], frame: str, magnification: float = 1.0, time: float = 0.0) -> Shape:
         """The configuration of a state: phi, alpha, beta (and bubble) of all rods; displacement and rotation of the spacecraft."""
         length, bent = self.length, (state["alpha"], state["beta"], state.get("bubble", 0.0))
-        chord = length - foreshortening(length, *bent) if self.keeps_arc else length
-        nodes, rods = chain(self.hinge, length, state["phi"], *bent[:2], magnification, bent[2], chord)
+        nodes, rods = chain(self.hinge, length, state["phi"], *bent[:2], magnification, bent[2], self.chord(*bent))
         shape = Shape(time, np.zeros(2), self.outline, nodes, rods)
         if frame == "moving":
             return shape
@@ -51,7 +54,10 @@ class Place:
 
 def chain(hinge: np.ndarray, length: np.ndarray, phi: np.ndarray, alpha: np.ndarray, beta: np.ndarray,
           magnification: float, bubble: np.ndarray | float = 0.0, chord: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes r_k = r_{k-1} + chord e_k, and points r_{k-1} + s e_k + v n_k with v = Na alpha + Nb beta + Nc bubble."""
+    """Nodes r_k = r_{k-1} + chord e_k, and points r_{k-1} + x chord e_k + v n_k, x = s/l, v = Na alpha + Nb beta + Nc bubble.
+
+    Arcs so drawn are longer than l by less than a thousandth where the chord keeps the arc's length and slopes stay below 0.5.
+    """
     chord = length if chord is None else chord
     along = np.stack([np.cos(phi), np.sin(phi)], axis=-1)
     across = np.stack([-along[:, 1], along[:, 0]], axis=-1)
@@ -111,10 +117,9 @@ def turned(shape: Shape, displacement: np.ndarray, rotation: float) -> Shape:
 def tip_path(run: Run, frame: str = "moving", rows: int = 4000) -> tuple[np.ndarray, np.ndarray]:
     """Times and places (row, 2) of the outermost node, at no more than so many rows."""
     every = slice(None, None, max(1, -(-run.time.size // rows)))
-    phi = run.rows("phi", every)
-    length = run.per_rod("length")
-    path = np.stack([run.number("spacecraft", "hinge_x", 0.0) + np.cos(phi) @ length,
-                     run.number("spacecraft", "hinge_y", 0.0) + np.sin(phi) @ length], axis=-1)
+    phi, place = run.rows("phi", every), Place(run)
+    chord = place.chord(run.rows("alpha", every), run.rows("beta", every), bubbles(run, every))
+    path = place.hinge + np.stack([(chord * np.cos(phi)).sum(axis=-1), (chord * np.sin(phi)).sum(axis=-1)], axis=-1)
     if frame == "inertial":
         path += np.stack([run.rows("displacement_x", every), run.rows("displacement_y", every)], axis=-1)
         theta = run.rows("rotation", every)

@@ -37,10 +37,11 @@ def matrices(run: Run) -> tuple[np.ndarray, np.ndarray]:
     model, initial = run.group("model"), run.group("initial")
     dynamic = model.get("bending", "dynamic") == "dynamic"
     lumped = model.get("inertia") == "lumped"
+    condensed = model.get("bending") == "quasistatic" and not lumped
     base = 0 if run.group("spacecraft").get("motion") == "fixed" else 3
     shapes = int(model.get("bending_shapes", 2))
     at = {"phi": base, "alpha": base + n, "beta": base + 2 * n, "bubble": base + 3 * n}
-    size = base + n * (1 + shapes if dynamic else 1)
+    size = base + n * (1 + shapes if dynamic or condensed else 1)
 
     length, density = run.per_rod("length"), run.per_rod("mass_per_length")
     phi = np.zeros(n) + np.asarray(initial.get("phi", 0.0), dtype=float)
@@ -66,7 +67,7 @@ def matrices(run: Run) -> tuple[np.ndarray, np.ndarray]:
         if not lumped:
             for x, weight in zip(GAUSS_X, GAUSS_W, strict=True):
                 point = move + x * length[k] * turn
-                if dynamic:
+                if dynamic or condensed:
                     point[:, at["alpha"] + k] = length[k] * x * (1 - x) ** 2 * across
                     point[:, at["beta"] + k] = -length[k] * x**2 * (1 - x) * across
                 if dynamic and shapes == 3:
@@ -74,11 +75,24 @@ def matrices(run: Run) -> tuple[np.ndarray, np.ndarray]:
                 mass += weight * density[k] * length[k] * point.T @ point
         move = move + length[k] * turn
         mass += node_mass[k + 1] * move.T @ move
+    if condensed:  # T^T M T
+        slopes = _slopes(run, at, base + n)
+        expansion = np.vstack([np.eye(base + n), slopes])
+        mass, size = expansion.T @ mass @ expansion, base + n
     return mass, _stiffness(run, at, size, dynamic)
 
 
-def _stiffness(run: Run, at: dict[str, int], size: int, dynamic: bool) -> np.ndarray:
-    """B^T C G B of the hinges, G = (I + F C)^-1 if bending follows from the moments; (2 EI/l)(2 1; 1 2) of the rods."""
+def _slopes(run: Run, at: dict[str, int], size: int) -> np.ndarray:
+    """alpha and beta of all rods by the coordinates, where they follow from the moments of the hinges."""
+    opening, spring = _springs(run, at, size, dynamic=False)
+    inner = spring @ opening
+    outer = np.vstack([inner[1:], np.zeros(size)])
+    unit = (run.per_rod("length") / (6.0 * run.per_rod("bending_stiffness")))[:, None]
+    return np.vstack([-unit * (2.0 * inner + outer), unit * (inner + 2.0 * outer)])
+
+
+def _springs(run: Run, at: dict[str, int], size: int, dynamic: bool) -> tuple[np.ndarray, np.ndarray]:
+    """B, the openings of the hinges, and C G: their moments by these, G = (I + F C)^-1 if bending follows from the moments."""
     n = run.n_rods
     opening = np.zeros((n, size))
     for k in range(n):
@@ -97,6 +111,13 @@ def _stiffness(run: Run, at: dict[str, int], size: int, dynamic: bool) -> np.nda
             flexibility[k, k] += 2.0 * slope[k - 1]
             flexibility[k - 1, k] = flexibility[k, k - 1] = slope[k - 1]
         spring = spring @ np.linalg.inv(np.eye(n) + flexibility @ spring)
+    return opening, spring
+
+
+def _stiffness(run: Run, at: dict[str, int], size: int, dynamic: bool) -> np.ndarray:
+    """B^T C G B of the hinges, (2 EI/l)(2 1; 1 2) of the rods."""
+    n = run.n_rods
+    opening, spring = _springs(run, at, size, dynamic)
     stiffness = opening.T @ spring @ opening
     if dynamic:
         bending = 2.0 * run.per_rod("bending_stiffness") / run.per_rod("length")

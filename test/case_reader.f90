@@ -55,13 +55,13 @@ contains
    subroutine single_elements(error)
       type(error_type), allocatable, intent(out) :: error
       type(case_config) :: config
-      call expect_accepted(error, valid//'&initial phi(3) = 7, phi = 1, alpha(2:3) = 5 6, beta(1:4) = 2 /', config)
+      call expect_accepted(error, valid//'&initial phi(3) = 7, phi = 1, alpha(2:3) = 0.5 0.6, beta(1:4) = 0.2 /', config)
       if (allocated(error)) return
       call check_close(error, config%initial%phi, [1.0_wp, 1.0_wp, 7.0_wp, 1.0_wp], 0.0_wp, 'phi')
       if (allocated(error)) return
-      call check_close(error, config%initial%alpha, [0.0_wp, 5.0_wp, 6.0_wp, 0.0_wp], 0.0_wp, 'alpha')
+      call check_close(error, config%initial%alpha, [0.0_wp, 0.5_wp, 0.6_wp, 0.0_wp], 0.0_wp, 'alpha')
       if (allocated(error)) return
-      call check_close(error, config%initial%beta, [2.0_wp, 2.0_wp, 2.0_wp, 2.0_wp], 0.0_wp, 'beta')
+      call check_close(error, config%initial%beta, [0.2_wp, 0.2_wp, 0.2_wp, 0.2_wp], 0.0_wp, 'beta')
    end subroutine single_elements
 
    subroutine hinge_bounds(error)

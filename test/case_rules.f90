@@ -281,7 +281,7 @@ contains
          spacecraft//'&chain n_rods = 3, length = 1, mass_per_length = 2*1, 0, bending_stiffness = 1, hinge_stiffness = 1 /'//nl// &
          '&model gauss_points = 1 /', &
          'c.nml:2: &chain mass_per_length = 2*1, 0: must be positive when bending = ''dynamic'', but is 0 for rod 3'//nl// &
-         'c.nml:3: &model gauss_points = 1: must be at least 2 when bending = ''dynamic''')
+         'c.nml:3: &model gauss_points = 1: must be at least 4 when bending = ''dynamic'' (the square of a shape has degree 6)')
    end subroutine bending_needs_mass
 
    subroutine massless_rod(error)

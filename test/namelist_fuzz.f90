@@ -12,7 +12,7 @@ module test_namelist_fuzz
    public :: collect_namelist_fuzz
 
    character(len=*), parameter :: rich = valid//"&case title = 'it''s', t_end = 2.5e0 / ! comment"//nl// &
-      '&initial phi = 2*0.5, -1d-1 2, alpha(2:3) = 5 6, beta(1) = 3 /'//nl// &
+      '&initial phi = 2*0.5, -1d-1 2, alpha(2:3) = .5 6e-1, beta(1) = 1 /'//nl// &
       "&load law = 'table', times = 0 0.1 0.7, values = 3*0.2, component = 'X' /"//nl// &
       "&load law = ""sine_squared"", value = -1500, rate = 0.3, t_start = .05 /"//nl// &
       "&solver method = 'erk', fixed_step = 1.1e-3, order = 5 /"//nl//'&output ledger = .false. /'//nl

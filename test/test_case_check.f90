@@ -16,7 +16,7 @@ module test_case_check
    private
    public :: collect_case_check
 
-   integer, parameter :: n_faults = 62
+   integer, parameter :: n_faults = 63
 
 contains
 
@@ -345,6 +345,10 @@ contains
          config%t_end = -1.0_wp
          config%solver%method = 'erk'
          config%solver%fixed_step = 1.0e-12_wp
+      case (63)
+         text = '&initial alpha = 10, beta = -10 /'
+         config%initial%alpha(:) = 10.0_wp
+         config%initial%beta(:) = -10.0_wp
       case default ! there is no other
       end select
 

@@ -18,6 +18,7 @@ contains
       type(unittest), allocatable, intent(out) :: suite(:)
       suite = [ &
          new_test('the largest deflection of a cubic, against a fine search', deflection_of_cubics), &
+         new_test('a bubble counts as deflection', bubble_deflects), &
          new_test('a rod at the limit of deflection is not warned of, one above it is', limit_of_deflection), &
          new_test('at the default limit the chord is one per cent too long', chord_at_limit), &
          new_test('a rod that swings at 0.4 of its own frequency is not warned of, one at 0.6 is', limit_of_vibration), &
@@ -47,8 +48,9 @@ contains
    end subroutine deflection_of_cubics
 
    !> One rod, 2 m, with its own frequency (pi/2)^2 sqrt(EI/m) = 24.674 rad/s.
-   function one_rod(bending) result(scene)
+   function one_rod(bending, shapes) result(scene)
       character(len=*), intent(in) :: bending
+      integer, intent(in), optional :: shapes
       type(scene_type) :: scene
       type(case_config) :: config
       type(error_type), allocatable :: error
@@ -61,14 +63,18 @@ contains
       config%chain%bending_stiffness = 100.0_wp
       config%chain%hinge_stiffness = 100.0_wp
       config%model%bending = bending
+      if (present(shapes)) config%model%bending_shapes = shapes
+      config%model%gauss_points = 5
       call new_scene(scene, config, error)
    end function one_rod
 
    !> Rows of one rod.
-   function layout()
+   function layout(shapes)
+      integer, intent(in), optional :: shapes
       type(row_layout) :: layout
       type(case_config) :: config
       config%chain%n_rods = 1
+      if (present(shapes)) config%model%bending_shapes = shapes
       layout = layout_of(config)
    end function layout
 
@@ -102,6 +108,24 @@ contains
       call validity%observe(row)
       call check(error, index(validity%warnings(), 'rod 1 bends by 0.07 of its length (t = 2.5 s)') == 1, validity%warnings())
    end subroutine limit_of_deflection
+
+   !> Alone, and against slopes that bend the rod the other way.
+   subroutine bubble_deflects(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(validity_type) :: validity
+      type(row_type) :: row
+
+      validity = new_validity(one_rod('dynamic', 3), layout(3), 1, 0.05_wp, 0.01_wp)
+      row = new_row(layout(3))
+      row%values(row%layout%before('bubble') + 1) = -2.0_wp*0.04_wp
+      call bend(row, 4.0_wp*0.04_wp, 0.0_wp)
+      call validity%observe(row)
+      call check(error, validity%warnings(), '', 'both')
+      if (allocated(error)) return
+      row%values(row%layout%before('bubble') + 1) = 2.0_wp*0.03_wp
+      call validity%observe(row)
+      call check(error, index(validity%warnings(), 'rod 1 bends by 0.07 of its length (t = 0 s)') == 1, validity%warnings())
+   end subroutine bubble_deflects
 
    !> By quadrature of v'^2/2 over an arc.
    subroutine chord_at_limit(error)

@@ -126,7 +126,8 @@ class Scene:
 def fault_of(scene: Scene, directory: pathlib.Path) -> str:
     """What is wrong with the program's answer; empty: nothing."""
     (directory / "case.nml").write_text(scene.text())
-    done = subprocess.run([RODYN, "modes", "case.nml", "--equilibrium", "--output", "case_modes.h5", "--force"], cwd=directory, capture_output=True, text=True)
+    command = [RODYN, "modes", "case.nml", "--equilibrium", "--output", "case_modes.h5", "--force"]
+    done = subprocess.run(command, cwd=directory, capture_output=True, text=True)
     if done.returncode:
         if "latches before" in done.stderr and scene.beyond_latch(scene.minimum(scene.phi)):
             return ""

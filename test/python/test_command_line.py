@@ -229,7 +229,7 @@ def test_all_faults_of_a_case_come_at_once(tmp_path, command):
      "&chain mass_per_length = 1.7, 0, 1.7: must be positive when bending = 'dynamic', but is 0 for rod 2"),
     (TIMES + SPACECRAFT + CHAIN.replace("mass_per_length = 1.7", "mass_per_length = 1.7, 0, 0").replace("0.5", "2*1, 0")
      + LUMPED, "&chain node_mass = 2*1, 0: rod 3 and its outer node are both without mass"),
-    (TIMES + SPACECRAFT + CHAIN + "&model gauss_points = 1 /", "&model gauss_points = 1: must be at least 2"),
+    (TIMES + SPACECRAFT + CHAIN + "&model gauss_points = 1 /", "&model gauss_points = 1: must be at least 4"),
     (TIMES + SPACECRAFT + CHAIN + "&solver order = 5 /", "&solver order = 5: needs a named method"),
     (TIMES + SPACECRAFT + CHAIN + "&solver method = 'bdf', order = 6 /", "&solver order = 6: must lie in 0..5"),
     (TIMES + SPACECRAFT + CHAIN + "&solver method = 'erk', order = 9 /", "&solver order = 9: must be 0 or lie in 2..8"),
@@ -654,19 +654,20 @@ def printed(text: str) -> dict[str, str]:
 
 
 @pytest.mark.parametrize(("scene", "uses", "skips"), [
-    ("flexible", "free spacecraft, dynamic bending, rod inertia, second-order inertia, dampers, 2 loads, loads on nodes, ledger",
+    ("flexible", "free spacecraft, dynamic bending, rod inertia, inextensible rods, second-order inertia, dampers, 2 loads, "
+                 "loads on nodes, ledger",
      "kinks"),
-    ("one rod", "free spacecraft, dynamic bending, rod inertia, second-order inertia, 1 load, ledger",
+    ("one rod", "free spacecraft, dynamic bending, rod inertia, inextensible rods, second-order inertia, 1 load, ledger",
      "dampers, kinks, loads on nodes, loads after t = 0.02 s"),
     ("lumped", "free spacecraft, 1 load, ledger",
      "dynamic bending, rod inertia, second-order inertia, dampers, kinks, loads on nodes, loads after t = 0.02 s"),
     ("quasistatic", "free spacecraft, quasistatic bending, dampers, 1 load, ledger",
      "dynamic bending, rod inertia, second-order inertia, kinks, loads on nodes, loads after t = 0.02 s"),
-    ("fixed", "dynamic bending, rod inertia, second-order inertia, kinks, 1 load, loads on nodes, ledger",
+    ("fixed", "dynamic bending, rod inertia, inextensible rods, second-order inertia, kinks, 1 load, loads on nodes, ledger",
      "free spacecraft, dampers"),
-    ("no ledger", "free spacecraft, dynamic bending, rod inertia, second-order inertia, 1 load",
+    ("no ledger", "free spacecraft, dynamic bending, rod inertia, inextensible rods, second-order inertia, 1 load",
      "dampers, kinks, loads on nodes, loads after t = 0.02 s, ledger"),
-    ("no loads, uncompressed", "free spacecraft, dynamic bending, rod inertia, second-order inertia, ledger",
+    ("no loads, uncompressed", "free spacecraft, dynamic bending, rod inertia, inextensible rods, second-order inertia, ledger",
      "dampers, kinks, loads"),
 ])
 def test_a_run_says_what_it_uses_and_what_it_skips(results, scene, uses, skips):
@@ -713,6 +714,16 @@ def test_the_formulation_of_the_article_is_noted_where_it_matters(results, tmp_p
     for number, text in enumerate([CHAIN + "&model formulation = 'paper', bending = 'rigid' /\n", CHAIN + PAPER + NO_LEDGER]):
         case = write_case(tmp_path, TIMES + SPACECRAFT + text, f"{number}.nml")
         assert "note" not in printed(rodyn("run", case, cwd=tmp_path).stdout)
+
+
+def test_condensed_rods_keep_their_chords_unless_arcs_are_asked_for(tmp_path):
+    condensed = TIMES + SPACECRAFT + CHAIN + "&model bending = 'quasistatic'{} /\n"
+    result = rodyn("run", write_case(tmp_path, condensed.format("")), cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    with h5py.File(tmp_path / "case.h5") as file:
+        assert "formulation = 'consistent'" in file.attrs["resolved_input"].decode()
+    result = rodyn("check", write_case(tmp_path, condensed.format(", formulation = 'inextensible'"), "arcs.nml"), cwd=tmp_path)
+    assert result.returncode == 2 and "take 'consistent'" in result.stderr
 
 
 def test_what_quasistatic_bending_leaves_out_is_noted(results, tmp_path):

@@ -5,6 +5,7 @@ import time as clock
 
 import animate
 import figures
+import geometry
 import h5py
 import histories
 import ledger
@@ -267,6 +268,28 @@ def test_natural_frequencies_agree_with_the_programs(runs, name):
     match = re.search(r"frequencies to ([\d.E+-]+) rad/s", reason)
     assert match, reason
     assert np.isclose(found[-1], float(match[1]), rtol=0.1)
+
+
+@pytest.mark.parametrize("model", ["bending = 'quasistatic'", "inertia = 'lumped', bending = 'quasistatic'"])
+def test_natural_frequencies_are_those_of_the_modes(tmp_path, model):
+    (tmp_path / "m.nml").write_text(result_files.case("Frequencies", 3, model, t_end=0.01, n_outputs=1))
+    for command in (["run", "m.nml"], ["modes", "m.nml"]):
+        result_files.subprocess.run([result_files.RODYN, *command, "--quiet"], cwd=tmp_path, check=True)
+    with open_run(tmp_path / "m.h5") as run, h5py.File(tmp_path / "m_modes.h5") as modes:
+        expected = modes["frequency"][modes["frequency"][()] > 1e-6]
+        assert np.allclose(natural_frequencies.natural_frequencies(run), expected, rtol=1e-8)
+
+
+def test_the_path_of_the_tip_is_that_of_the_drawn_tip(tmp_path):
+    (tmp_path / "t.nml").write_text(result_files.case("Bent", 2, "bending_shapes = 3, gauss_points = 5", t_end=0.02, n_outputs=4)
+                                    + "&initial phi = 0.3, 0.8, alpha = 0.5, 0.2, beta = -0.5, 0.1, bubble = 0.05, -0.1 /\n")
+    result_files.subprocess.run([result_files.RODYN, "run", "t.nml", "--quiet"], cwd=tmp_path, check=True)
+    with open_run(tmp_path / "t.h5") as run:
+        for frame in ("moving", "inertial"):
+            _, path = geometry.tip_path(run, frame)
+            drawn = [shape.nodes[-1] for shape in geometry.shapes(run, np.arange(run.time.size), frame=frame)]
+            assert np.allclose(path, drawn, rtol=0, atol=1e-13)
+            assert frame == "inertial" or np.hypot(*(path[0] - geometry.Place(run).hinge)) < 2.4  # two rods of 1.2 m
 
 
 def test_a_long_line_keeps_its_peaks():

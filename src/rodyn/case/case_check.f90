@@ -5,7 +5,7 @@ module rodyn_case_check
    use rodyn_kinds, only: wp
    use rodyn_case_config, only: case_config, hinge_config, kink_config, load_config, model_config, profile_config, case_extents, &
       none_given, visit_case
-   use rodyn_case_rules, only: check_case
+   use rodyn_case_rules, only: check_case, is_condensed
    use rodyn_case_values, only: list_text, value_shown
    use rodyn_errors, only: error_type
    use rodyn_faults, only: fault_list
@@ -83,12 +83,14 @@ contains
       call checker%faults%to_error('', error)
    end subroutine sound_case
 
-   !> Defaults that come from other keys, as far as these are sound. A table of a kink has its own times.
+   !> Defaults that come from other keys, as far as these are sound. A table of a kink has its own times. Condensed rods keep their
+   !> chords.
    subroutine complete_case(checker, config)
       class(key_checker), intent(in) :: checker
       type(case_config), intent(inout) :: config !! lists allocated
       integer :: i
 
+      if (is_condensed(config) .and. .not. checker%is_given('model', 1, 'formulation')) config%model%formulation = 'consistent'
       do i = 1, size(config%profiles)
          if (config%profiles(i)%last_rod == blank_profile%last_rod) config%profiles(i)%last_rod = config%chain%n_rods
       end do
@@ -145,6 +147,7 @@ contains
             end if
          case ('model')
             if (key == 'bending') given = c%model%bending /= blank_model%bending
+            if (key == 'formulation') given = c%model%formulation /= blank_model%formulation
          case ('rod_profile')
             given = profile_gives(c%profiles(instance), key)
          case ('load')

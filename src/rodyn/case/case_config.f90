@@ -289,7 +289,7 @@ contains
       type(model_config), intent(inout) :: model
       call visitor%open_group(group('model', help='which equations, and how they are evaluated'), 1)
       call visitor%word_field(model%formulation, key('formulation', words='inextensible|consistent|paper', &
-         help='bent rods keep their arc, or their chord; paper: chord, no second-order inertia, as the article'))
+         help="bent rods keep their arc, or chord; paper: chord, as the article. Condensed: default 'consistent'"))
       call visitor%word_field(model%inertia, key('inertia', words='distributed|lumped', &
          help='mass along the rods, or half of it at each of their ends'))
       call visitor%word_field(model%bending, key('bending', words='dynamic|quasistatic|rigid', &

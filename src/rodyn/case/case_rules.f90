@@ -11,7 +11,7 @@ module rodyn_case_rules
    use rodyn_time_law, only: moves_smoothly
    implicit none (type, external)
    private
-   public :: check_case
+   public :: check_case, is_condensed
 
 contains
 
@@ -24,6 +24,7 @@ contains
       call check_spacecraft(checker, config)
       call check_model(checker, config)
       call check_bending(checker, config)
+      call check_chords(checker, config)
       call check_masses(checker, config)
       call check_solver(checker, config)
       do i = 1, size(config%profiles)
@@ -165,6 +166,32 @@ contains
 
    end subroutine check_bending
 
+   !> A bent rod that keeps its arc has a chord, l - int v'^2/2 ds (docs/model.md sec. 3).
+   subroutine check_chords(checker, config)
+      class(key_checker), intent(inout) :: checker
+      type(case_config), intent(in) :: config
+      character(len=*), parameter :: keys(3) = [character(len=6) :: 'alpha', 'beta', 'bubble']
+      integer :: i, k
+
+      if (config%model%formulation /= 'inextensible' .or. config%model%bending /= 'dynamic') return
+      if (.not. all([(checker%is_sound('initial', 1, trim(keys(i))), i=1, 3), checker%is_sound('chain', 1, 'length')])) return
+      associate (a => config%initial%alpha, b => config%initial%beta, c => config%initial%bubble, length => config%chain%length)
+         if (any([size(a), size(b), size(c)] /= size(length))) return
+         k = findloc(shortening(a, b, c/length) >= 1.0_wp, .true., 1)
+         if (k > 0) call checker%report('initial', 1, 'alpha', 'bends rod '//to_text(k)//' so much that int v''^2/2 ds, '// &
+                                        'by which its chord is shorter than its arc, is more than its length')
+      end associate
+
+   contains
+
+      !> Over l, by the end slopes and bubble/l.
+      elemental real(wp) function shortening(a, b, c)
+         real(wp), intent(in) :: a, b, c
+         shortening = (2.0_wp*(a**2 + b**2) - a*b)/30.0_wp + 8.0_wp/15.0_wp*(a - b)*c + 256.0_wp/105.0_wp*c**2
+      end function shortening
+
+   end subroutine check_chords
+
    !> What moves has mass: the shapes of a rod that bends as motion, and every node or the rod before it.
    subroutine check_masses(checker, config)
       class(key_checker), intent(inout) :: checker
@@ -173,8 +200,9 @@ contains
 
       if (.not. (checker%is_sound('model', 1, 'bending') .and. checker%is_sound('model', 1, 'inertia'))) return
       if (config%model%bending == 'dynamic') then
-         if (checker%is_sound('model', 1, 'gauss_points') .and. config%model%gauss_points < 2) &
-            call checker%report('model', 1, 'gauss_points', "must be at least 2 when bending = 'dynamic'")
+         if (checker%is_sound('model', 1, 'gauss_points') .and. config%model%gauss_points < 4) &
+            call checker%report('model', 1, 'gauss_points', &
+                                "must be at least 4 when bending = 'dynamic' (the square of a shape has degree 6)")
       end if
       if (.not. sound_chain('mass_per_length')) return
       mass = config%chain%mass_per_length

@@ -13,7 +13,7 @@ module rodyn_kinematics
 
    !> What the ledger records of a state. Momenta along inertial axes, angular momentum about their origin.
    type :: invariants_type
-      real(wp) :: kinetic = 0.0_wp          !! kinetic energy, all terms kept in either formulation [J]
+      real(wp) :: kinetic = 0.0_wp          !! kinetic energy, all terms kept in any formulation [J]
       real(wp) :: elastic = 0.0_wp          !! energy of hinges and rods [J]
       real(wp) :: momentum(2) = 0.0_wp      !! [kg m/s]
       real(wp) :: angular_momentum = 0.0_wp !! [kg m^2/s]

@@ -53,6 +53,7 @@ module rodyn_validity
       real(wp) :: axial_limit_arc = 0.0_wp !! the same if their arcs were kept; zero if they are
       integer :: n_seen = 0 !! rows
       integer :: every = 1  !! from row to row of those whose axial forces are judged
+      integer :: bubble = -1 !! the same as the next ones; -1: there is none
       integer :: alpha = 0, beta = 0, alpha_rate = 0, beta_rate = 0, phi_rate = 0, omega = 0 !! where they begin in a row, less one
       type(rod_record), allocatable :: rods(:) !! (n); none if rods do not bend
    contains
@@ -81,6 +82,7 @@ contains
       self%every = every
       self%alpha = layout%before('alpha')
       self%beta = layout%before('beta')
+      if (scene%n_bend == 3) self%bubble = layout%before('bubble')
       self%alpha_rate = layout%before('alpha_rate')
       self%beta_rate = layout%before('beta_rate')
       self%phi_rate = layout%before('phi_rate')
@@ -115,6 +117,7 @@ contains
                     ar => row%values(self%alpha_rate + k), br => row%values(self%beta_rate + k), &
                     w => row%values(self%omega + 1) + row%values(self%phi_rate + k))
             deflection = greatest_deflection(a, b)
+            if (self%bubble >= 0) deflection = deflection_with_bubble(a, b, row%values(self%bubble + k)/seen%length)
             if (deflection > seen%deflection) then
                seen%deflection = deflection
                seen%t_deflection = row%time
@@ -224,6 +227,20 @@ contains
       end function at
 
    end function greatest_deflection
+
+   !> The same with the third shape: the largest of 63 points, 0.1 % below the largest at most.
+   pure real(wp) function deflection_with_bubble(alpha, beta, bubble) result(largest)
+      real(wp), intent(in) :: alpha, beta !! [rad]
+      real(wp), intent(in) :: bubble      !! over l
+      real(wp) :: x
+      integer :: i
+
+      largest = 0.0_wp
+      do i = 1, 63
+         x = i/64.0_wp
+         largest = max(largest, abs(x*(1.0_wp - x)*(alpha*(1.0_wp - x) - beta*x + 16.0_wp*x*(1.0_wp - x)*bubble)))
+      end do
+   end function deflection_with_bubble
 
    !> What a reader of the results should know, one line each, without a closing newline; empty if all is well.
    function warnings(self) result(text)

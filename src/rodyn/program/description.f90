@@ -23,6 +23,7 @@ contains
       call note(scene%dynamic_bending, 'dynamic bending')
       if (scene%quasistatic) call note(.true., 'quasistatic bending')
       call note(.not. scene%lumped, 'rod inertia')
+      if (scene%dynamic_bending) call note(scene%inextensible, 'inextensible rods')
       call note((scene%dynamic_bending .or. scene%condensed) .and. scene%consistent, 'second-order inertia')
       call note(scene%hinges%has_damping, 'dampers')
       call note(any(abs(scene%kinks%constant) > 0.0_wp) .or. scene%hinges%driven, 'kinks')

@@ -155,7 +155,7 @@ contains
       if (shortens) call integrate_shortening(rod, mass_per_length, size(rule%points) + 4, profile)
    end subroutine integrate_mass
 
-   !> Integrals of the foreshortening. Those of d^2 have eight degrees more than those of v^2.
+   !> Integrals of the foreshortening. Those of d^2 have degree 10 with two shapes and 14 with three, those of v^2 6 and 8.
    pure subroutine integrate_shortening(rod, mass_per_length, n_points, profile)
       type(rod_constants), intent(inout) :: rod
       real(wp), intent(in) :: mass_per_length
