@@ -7,7 +7,9 @@ import importlib.util
 import math
 import os
 import pathlib
+import signal
 import sys
+import threading
 import weakref
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
@@ -22,7 +24,7 @@ BAD_INPUT, STOPPED = 2, 75  # exit codes of the program
 KINDS = np.dtype("float64"), np.dtype("int32")
 MODES_AT = {"start": 0, "equilibrium": 1, "loads": 2}
 Watcher = Callable[[float, float, int], Any]
-_coordinates: dict[str, Any] = {"of": None, "made": None}  # of the last result
+_last: dict[str, Any] = {"key": None, "blank": None}
 
 
 class RodynError(Exception):
@@ -123,11 +125,10 @@ class Case:
     def _integrate(self, progress: bool | Watcher, read: Callable[[ctypes.c_void_p], Any]) -> Any:
         watch = _Watch(progress)
         result = ctypes.c_void_p()
-        with _library.LOCK:
+        with watch, _library.LOCK:
             code = library.rodyn_case_run(self._handle, watch.callback, None, ctypes.byref(result))
             message = self._message() if code else ""
             run = _take(result, read)
-        watch.finish()
         if watch.raised is not None:
             raise watch.raised
         if code == BAD_INPUT:
@@ -186,26 +187,42 @@ def namelist_text(value: Any) -> str:
 
 
 class _Watch:
-    """Stands between a run and whoever watches it; what is raised meanwhile is raised again afterwards."""
+    """Stands between a run and whoever watches it. What is raised meanwhile is raised again afterwards.
+
+    Python would raise KeyboardInterrupt as soon as the library calls it, before anything could catch it there: the signal is noted, and
+    goes to its handler once the run has ended.
+    """
 
     def __init__(self, progress: bool | Watcher):
         self.raised: BaseException | None = None
         self._watch = progress if callable(progress) else _print_progress if progress else None
         self._prints = progress is True
+        self._handler: Any = None
+        self._signal: tuple[int, Any] | None = None
         self.callback = _library.WATCHER(self._call)
 
     def _call(self, t: float, t_end: float, n_steps: int, _: Any) -> int:
-        try:  # Python raises KeyboardInterrupt here, too
-            if self._watch:
+        try:
+            if self._watch and not self._signal:
                 self._watch(t, t_end, n_steps)
         except BaseException as error:
             self.raised = error
-            return 1
-        return 0
+        return int(self.raised is not None or self._signal is not None)
 
-    def finish(self) -> None:
+    def _note(self, number: int, frame: Any) -> None:
+        self._signal = number, frame
+
+    def __enter__(self) -> None:
+        if threading.current_thread() is threading.main_thread() and callable(signal.getsignal(signal.SIGINT)):
+            self._handler = signal.signal(signal.SIGINT, self._note)
+
+    def __exit__(self, *_: object) -> None:
+        if self._handler is not None:
+            signal.signal(signal.SIGINT, self._handler)
         if self._prints:
             print("\r" + 60 * " ", end="\r", file=sys.stderr, flush=True)
+        if self._signal is not None:
+            self._handler(*self._signal)
 
 
 def _print_progress(t: float, t_end: float, n_steps: int) -> None:
@@ -237,24 +254,30 @@ def _arrays(result: ctypes.c_void_p) -> list[tuple[str, tuple[str, ...], np.ndar
 
 
 def _dataset(result: ctypes.c_void_p) -> xarray.Dataset:
-    variables, coordinates = {}, {}
-    for name, dims, values, attributes in _arrays(result):
-        variable = xarray.Variable(dims, values, attributes, fastpath=True)
-        (coordinates if dims == (name,) else variables)[name] = variable
+    arrays = _arrays(result)
+    data = {name: values for name, dims, values, _ in arrays if dims != (name,)}
     attribute, attributes = Attribute(), {}
     for i in range(library.rodyn_result_attributes(result)):
         library.rodyn_result_attribute(result, i, ctypes.byref(attribute))
         value = attribute.text.decode() if attribute.kind == 0 else _number(attribute)
         attributes[attribute.name.decode()] = value
-    return xarray.Dataset(variables, _indexed(coordinates), attributes)
+    made = _blank(arrays).copy(data=data)
+    made.attrs = attributes
+    return made
 
 
-def _indexed(coordinates: dict[str, xarray.Variable]) -> xarray.Coordinates:
-    """Coordinates with their indices, which take longer to make than a short run: those of the last result are kept."""
-    key = {name: x.values.tobytes() for name, x in coordinates.items()}
-    if _coordinates["of"] != key:
-        _coordinates.update(of=key, made=xarray.Coordinates(coordinates))
-    return _coordinates["made"]
+def _blank(arrays: list[tuple[str, tuple[str, ...], np.ndarray, dict[str, str]]]) -> xarray.Dataset:
+    """A data set with these coordinates and without numbers. Making it takes longer than a short run, so the last one is kept."""
+    key = [(name, dims, values.tobytes() if dims == (name,) else (values.shape, values.dtype)) for name, dims, values, _ in arrays]
+    if _last["key"] != key:
+        variables, coordinates = {}, {}
+        for name, dims, values, attributes in arrays:
+            if dims == (name,):
+                coordinates[name] = xarray.Variable(dims, values.copy(), attributes)
+            else:
+                variables[name] = xarray.Variable(dims, np.broadcast_to(np.zeros((), values.dtype), values.shape), attributes)
+        _last.update(key=key, blank=xarray.Dataset(variables, xarray.Coordinates(coordinates)))
+    return _last["blank"]
 
 
 def _values(array: Array, rank: int) -> np.ndarray:

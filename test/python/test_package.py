@@ -7,6 +7,7 @@ import os
 import pathlib
 import pickle
 import re
+import signal
 import subprocess
 import sys
 import threading
@@ -143,6 +144,35 @@ def test_whoever_watches_may_stop_a_run():
     assert len(seen) == 3 and seen[0][0] < seen[2][0] < seen[2][1] == 1e4 and seen[0][2] < seen[2][2]
 
 
+def test_ctrl_c_stops_a_run():
+    code = """
+import rodyn, signal
+signal.signal(signal.SIGINT, signal.default_int_handler)
+case = rodyn.Case('cases/table1.nml')
+case['case.t_end'], case['solver.method'] = 1e6, 'dop853'
+case.run(progress=lambda *_: print('runs', flush=True))
+"""
+    environment = os.environ | {"PYTHONPATH": str(ROOT / "postproc")}
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment,
+                          cwd=ROOT) as process:
+        assert process.stdout.readline() == "runs\n"
+        process.send_signal(signal.SIGINT)
+        _, printed = process.communicate(timeout=60)
+    assert process.returncode != 0 and printed.rstrip().endswith("KeyboardInterrupt")
+
+
+def test_data_sets_share_nothing():
+    case = short_case()
+    first, second = case.run(), case.run()
+    kept = second.copy(deep=True)
+    first.phi[:] = 7.0
+    first.phi.attrs["units"] = "deg"
+    first.time.attrs["units"] = "min"
+    assert second.identical(kept) and case.run().phi.identical(kept.phi)
+    case["case.t_end"] = 0.25
+    assert float(case.run().time[-1]) == 0.25 and float(second.time[-1]) == 0.5
+
+
 def test_threads_get_the_results_of_one():
     """Different cases at the same time, with what reads and writes texts."""
     def values(i):
@@ -266,7 +296,7 @@ def test_the_example_in_c(tmp_path):
 
 def test_pip_installs_package_library_and_scripts(tmp_path):
     """Without a network: nothing is needed to build the wheel."""
-    command = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps", "--no-index",
+    command = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps", "--no-index", "--no-compile",
                "--target", tmp_path, ROOT / "postproc"]
     subprocess.run(command, check=True, capture_output=True)
     environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"} | {"PYTHONPATH": str(tmp_path)}
