@@ -33,6 +33,8 @@ module rodyn_bench_jobs
       integer :: n_seen = 0
       real(wp), allocatable :: phi(:, :)        !! (n, probe) [rad]
       real(wp), allocatable :: alpha_rate(:, :) !! (n or 0, probe) [rad/s]
+      real(wp), allocatable :: node(:, :)       !! x and y of nodes 1..n along the moving axes, from hinge 0 (2 n, probe) [m]
+      real(wp), allocatable :: spacecraft(:, :) !! its displacement and rotation (3 or 0, probe) [m, rad]
    contains
       procedure :: observe
    end type probe_recorder
@@ -60,12 +62,19 @@ contains
       real(wp), intent(in) :: t
       real(wp), intent(in) :: y(:)
       type(error_type), allocatable, intent(out) :: error
-      integer :: first
+      real(wp) :: place(2)
+      integer :: first, k
 
       associate (unused => t, unused_error => error); end associate
       self%n_seen = self%n_seen + 1
-      associate (scene => motion%dynamics%scene)
-         self%phi(:, self%n_seen) = y(scene%phi_at() + 1:scene%phi_at() + scene%n)
+      associate (scene => motion%dynamics%scene, phi => self%phi(:, self%n_seen))
+         phi = y(scene%phi_at() + 1:scene%phi_at() + scene%n)
+         self%spacecraft(:, self%n_seen) = y(:scene%n_base)
+         place = 0.0_wp
+         do k = 1, scene%n
+            place = place + scene%chord(k, y(:motion%n_q))*[cos(phi(k)), sin(phi(k))]
+            self%node(2*k - 1:2*k, self%n_seen) = place
+         end do
          if (.not. scene%dynamic_bending) return
          first = motion%n_q + scene%alpha_at()
          self%alpha_rate(:, self%n_seen) = y(first + 1:first + scene%n)
@@ -173,6 +182,8 @@ contains
       options%fixed_step = fixed_step
       allocate (recorder%phi(motion%dynamics%scene%n, size(times)))
       allocate (recorder%alpha_rate(merge(motion%dynamics%scene%n, 0, motion%dynamics%scene%dynamic_bending), size(times)))
+      allocate (recorder%node(2*motion%dynamics%scene%n, size(times)))
+      allocate (recorder%spacecraft(motion%dynamics%scene%n_base, size(times)))
       call system_clock(start, rate)
       monitor%deadline = start + int(budget*real(rate, wp), i8)
       seconds = huge(1.0_wp)
@@ -198,6 +209,10 @@ contains
       call write_table(recorder%phi)
       write (*, '(a)', advance='no') ', "alpha_rate": '
       call write_table(recorder%alpha_rate)
+      write (*, '(a)', advance='no') ', "node": '
+      call write_table(recorder%node)
+      write (*, '(a)', advance='no') ', "spacecraft": '
+      call write_table(recorder%spacecraft)
       write (*, '(a)') '}'
    end subroutine time_integration
 

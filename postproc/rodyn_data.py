@@ -458,16 +458,23 @@ class Series(NamedTuple):
 
 
 class BenchmarkScene(NamedTuple):
-    """Runs of several methods at several tolerances of one scene."""
+    """Runs of one scene by several methods at several tolerances, or of several models of its rods with several numbers of them."""
 
     name: str
     title: str
-    method: np.ndarray
+    line: np.ndarray  # method or model
+    rods: np.ndarray  # that each beam is cut into; 0: methods are compared
     rtol: np.ndarray
     seconds: np.ndarray
     fixed_step: np.ndarray  # 0: adaptive
     foreign: np.ndarray  # true: computed by another program
     errors: dict[str, tuple[str, np.ndarray]]  # data set: label, values
+
+    def only(self, chosen: np.ndarray) -> BenchmarkScene:
+        """Of these computations."""
+        errors = {name: (label, values[chosen]) for name, (label, values) in self.errors.items()}
+        columns = ("line", "rods", "rtol", "seconds", "fixed_step", "foreign")
+        return self._replace(**{name: getattr(self, name)[chosen] for name in columns}, errors=errors)
 
 
 BENCHMARK_ERRORS = {
@@ -486,14 +493,17 @@ def read_benchmark(path: str | pathlib.Path) -> list[BenchmarkScene]:
             for needed in ("method", "rtol"):
                 if needed not in group:
                     raise DataError(f"{path}: scene '{name}' has no data set '{needed}'")
-            errors = {e: (label, group[e][()]) for e, label in BENCHMARK_ERRORS.items() if e in group}
+            labels = BENCHMARK_ERRORS | {"error_beam": text_of(group.attrs.get("error_label", "error to the beam"))}
+            errors = {e: (label, group[e][()]) for e, label in labels.items() if e in group}
             if not errors:
-                raise DataError(f"{path}: scene '{name}' has neither {' nor '.join(BENCHMARK_ERRORS)}")
+                raise DataError(f"{path}: scene '{name}' has neither {' nor '.join(labels)}")
             title = text_of(group.attrs.get("title", "")) or name
-            method = np.array(texts(group["method"]))
-            fixed_step = group["fixed_step"][()] if "fixed_step" in group else np.zeros(method.size)
-            foreign = np.array(texts(group["program"])) != "rodyn" if "program" in group else np.zeros(method.size, bool)
-            scenes.append(BenchmarkScene(name, title, method, group["rtol"][()], group["seconds"][()], fixed_step, foreign, errors))
+            line = np.array(texts(group["model" if "model" in group else "method"]))
+            none = np.zeros(line.size)
+            columns = [group[x][()] if x in group else none for x in ("rods", "rtol", "seconds", "fixed_step")]
+            foreign = np.array(texts(group["program"])) != "rodyn" if "program" in group else none > 0
+            scene = BenchmarkScene(name, title, line, *columns, foreign, errors)
+            scenes.append(scene.only(group["chosen"][()]) if "chosen" in group else scene)
     if not scenes:
         raise DataError(f"{path}: is no benchmark file: no group with a data set 'seconds'")
     return scenes

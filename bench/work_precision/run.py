@@ -499,9 +499,9 @@ class Benchmark:
     def report(self, command: str) -> str:
         peers = "; ".join(f"{state}" if not state.startswith("absent") else f"{peer} {state}" for peer, state in self.peers.items())
         text = [f"Machine: {machine()}. Rodyn {commit()}; {self.names['compiler']}, flags `{plain_flags(self.names['compiler_options'])}`.",
-                f"Peers: {peers or 'none'}.", "", "```", command, "```", "", "### Figures", ""]
+                f"Peers: {peers or 'none'}.", "", "```", command, "```", "", "#### Figures", ""]
         text += [f"- {figure}" for figure in self.figures]
-        text += ["", "### Time at equal error", "",
+        text += ["", "#### Time at equal error", "",
                  "Milliseconds of wall time, least of all rounds, interpolated between computations in log-log;",
                  "an empty place: no computation on both sides of that error, or none within the budget.", ""]
         for scene, found in self.results.items():
