@@ -338,7 +338,8 @@ def table(found: list[Setting], models: Sequence[str]) -> list[str]:
     base = [fastest(found, target, *BASE) for target in TARGETS]
     rows = [(f"{BASE[0]}, {BASE[1]} rods", base)] + [(model, [fastest(found, target, model) for target in TARGETS]) for model in models]
     for name, row in rows:
-        text.append(f"| {name} | " + " | ".join(cell(setting, other) for setting, other in zip(row, base, strict=True)) + " |")
+        if any(row):
+            text.append(f"| {name} | " + " | ".join(cell(setting, other) for setting, other in zip(row, base, strict=True)) + " |")
     return text
 
 

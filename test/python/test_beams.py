@@ -54,5 +54,5 @@ def test_the_picture_has_a_line_per_model_and_a_point_per_number_of_rods(made):
 def test_the_table_names_the_fastest_chain_within_each_error(made):
     lines = made.with_suffix(".md").read_text(encoding="utf-8").splitlines()
     cells = {line.split("|")[1].strip(): [cell.strip() for cell in line.split("|")[2:-1]] for line in lines if line.startswith("| ")}
-    assert cells["condensed"] == ["", "", "", ""]
+    assert "condensed" not in cells
     assert [cell.split(", ")[1:] for cell in cells["inextensible, 2 shapes"]] == [["1"], ["2"], ["2"], []]
