@@ -14,6 +14,9 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 MODELS = ("consistent, 2", "inextensible, 2", "condensed")
 
 
+pytestmark = pytest.mark.long  # all of them look at what takes twelve seconds to compute
+
+
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     out = tmp_path_factory.mktemp("beams") / "quick"

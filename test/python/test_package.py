@@ -294,6 +294,7 @@ def test_the_example_in_c(tmp_path):
     assert printed.returncode == 0 and float(re.search(r"phi_4 = (\S+) rad", printed.stdout)[1]) == float(case.run().phi[-1, 3])
 
 
+@pytest.mark.long
 def test_pip_installs_package_library_and_scripts(tmp_path):
     """Without a network: nothing is needed to build the wheel."""
     command = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps", "--no-index", "--no-compile",
