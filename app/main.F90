@@ -1,6 +1,7 @@
 !> The program `rodyn`: arguments in, exit code out; everything else is in the library.
 !>
-!> `tools/stamp_commit` writes the commit into `git_commit.inc` (ignored by git) for builds with -DRODYN_STAMPED.
+!> `tools/stamp_commit` writes the commit into `git_commit.inc` (ignored by git) for builds with -DRODYN_STAMPED,
+!> those of `tools/compile`.
 program main
    use rodyn_build_info, only: set_git_commit
    use rodyn_command_line, only: run_command

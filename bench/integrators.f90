@@ -47,7 +47,7 @@ end module rodyn_bench_oscillators
 
 !> Prints one line for the shim and one for each method.
 program bench_integrators
-   use, intrinsic :: iso_c_binding, only: c_ptr, c_int, c_loc, c_null_ptr, c_double
+   use, intrinsic :: iso_c_binding, only: c_ptr, c_int, c_loc, c_double
    use rodyn_kinds, only: wp, i8
    use rodyn_errors, only: error_type
    use rodyn_ode, only: ode_system
@@ -56,8 +56,7 @@ program bench_integrators
    use rodyn_sundials_base, only: callback_data, rhs_shim
    use rodyn_integrator, only: integrator_type, solver_options, solver_statistics
    use rodyn_integrators, only: new_integrator
-   use fsundials_context_mod, only: FSUNContext_Create
-   use fsundials_nvector_mod, only: N_Vector
+   use rodyn_sundials_interface, only: new_context, N_Vector
    implicit none (type, external)
 
    integer, parameter :: n = 26, n_calls = 20000000
@@ -87,7 +86,7 @@ program bench_integrators
    direct = real(t1 - t0, wp)/real(rate, wp)/real(n_calls, wp)
 
    data%system => system
-   flag = FSUNContext_Create(c_null_ptr, context)
+   flag = new_context(context)
    y => new_nvector(n, n, context)
    ydot => new_nvector(n, n, context)
    user_data = c_loc(data)

@@ -38,6 +38,7 @@ rule link
   description = $out
 """
 LESS = {("src", "rodyn", folder): "-O1" for folder in ("input", "output", "sweep", "program", "interface")}
+STAMPED = {"app": "-DRODYN_STAMPED"}  # includes what tools/stamp_commit wrote
 PROGRAMS = {"app/main.F90": "bin/rodyn", "test/main.f90": "test/tester", "test/sample_run.f90": "test/sample_run"}
 SHARED = ("app/shared.F90", "src/rodyn/interface/c_interface.f90") # what else it needs comes from the archive
 ARCHIVES = {"src": "lib/librodyn.a", "test": "objects/libtest.a"}
@@ -49,7 +50,7 @@ def main() -> None:
     if "--enable-default-pie" not in subprocess.run([compiler, "-v"], capture_output=True, text=True).stderr:
         flags += " -fPIE" # or the shared library could not be made from the same objects
     print(RULES.format(stage=stage, compiler=compiler, flags=flags, libraries=libraries))
-    paths = [path for pattern in ("src/**/*.f90", "app/*.F90", "test/*.f90") for path in sorted(ROOT.glob(pattern))]
+    paths = [path for pattern in ("src/**/*.[fF]90", "app/*.F90", "test/*.f90") for path in sorted(ROOT.glob(pattern))]
     texts = {path.relative_to(ROOT): path.read_text() for path in paths}
     modules_of = {"src": f"{stage}/include", "app": f"{stage}/include", "test": f"{stage}/objects"}
     module_file = {name: f"{modules_of[path.parts[0]]}/{name}.mod" for path, text in texts.items() for name in MODULE.findall(text)}
@@ -65,7 +66,8 @@ def main() -> None:
         needed += [str(path.parent / name) for name in INCLUDE.findall(text)]
         print(f"build {made}{' | ' * bool(offered)}{' '.join(offered)}: compile {path} | {' '.join(needed)}")
         print(f"  modules = {modules_of[folder]}")
-        print("  more =", "-O0" if folder == "test" else LESS.get(path.parts[:3], "") if "-O3" in flags else "")
+        less = "-O0" if folder == "test" else LESS.get(path.parts[:3], "")
+        print("  more =", less if "-O3" in flags else "", STAMPED.get(folder, ""))
         if str(path) in PROGRAMS:
             parts = [made, *in_c] if folder == "app" else [made, f"{stage}/{ARCHIVES['test']}"]
             print(f"build {stage}/{PROGRAMS[str(path)]}: link {' '.join(parts)} {stage}/{ARCHIVES['src']}")

@@ -17,15 +17,14 @@ module rodyn_cvode_integrator
    use rodyn_quadrature_history, only: quadrature_history
    use rodyn_nvector, only: vector_content, content_of
    use rodyn_newton_solver, only: new_newton_matrix, new_newton_solver, linear_system_shim
-   use rodyn_sundials_base, only: rhs_shim, weights_shim, quiet_handler, check
+   use rodyn_sundials_base, only: rhs_shim, weights_shim, check
    use rodyn_sundials_integrator, only: sundials_integrator
-   use fsundials_matrix_mod, only: SUNMatrix, FSUNMatDestroy
-   use fsundials_linearsolver_mod, only: SUNLinearSolver, FSUNLinSolFree
-   use fsundials_nonlinearsolver_mod, only: SUNNonlinearSolver, FSUNNonlinSolFree
+   use rodyn_sundials_interface, only: silence_cvode, SUNMatrix, FSUNMatDestroy, SUNLinearSolver, FSUNLinSolFree, &
+      SUNNonlinearSolver, FSUNNonlinSolFree
    use fsunnonlinsol_fixedpoint_mod, only: FSUNNonlinSol_FixedPoint
    use fcvode_mod, only: CV_ADAMS, CV_BDF, CV_SUCCESS, CV_ONE_STEP, FCVodeCreate, FCVodeInit, FCVodeReInit, FCVodeFree, &
-      FCVode, FCVodeGetDky, FCVodeSetUserData, FCVodeWFtolerances, FCVodeSetErrHandlerFn, FCVodeSetMaxOrd, &
-      FCVodeSetMaxStep, FCVodeSetStopTime, FCVodeSetStabLimDet, FCVodeSetNonlinearSolver, FCVodeSetLinearSolver, &
+      FCVode, FCVodeGetDky, FCVodeSetUserData, FCVodeWFtolerances, FCVodeSetMaxOrd, FCVodeSetMaxStep, &
+      FCVodeSetStopTime, FCVodeSetStabLimDet, FCVodeSetNonlinearSolver, FCVodeSetLinearSolver, &
       FCVodeSetLinSysFn, FCVodeGetNumErrTestFails, FCVodeGetNumNonlinSolvConvFails, FCVodeGetLastOrder, FCVodeGetLastStep, &
       FCVodeGetNumJacEvals
    implicit none (type, external)
@@ -106,7 +105,7 @@ contains
          return
       end if
       associate (memory => self%memory)
-         call check(error, FCVodeSetErrHandlerFn(memory, c_funloc(quiet_handler), c_null_ptr), 'CVodeSetErrHandlerFn')
+         call check(error, silence_cvode(memory), 'CVodeSetErrHandlerFn')
          call check(error, FCVodeInit(memory, c_funloc(rhs_shim), t, self%state), 'CVodeInit', t)
          call check(error, FCVodeSetUserData(memory, c_loc(self%data)), 'CVodeSetUserData')
          call check(error, FCVodeWFtolerances(memory, c_funloc(weights_shim)), 'CVodeWFtolerances')

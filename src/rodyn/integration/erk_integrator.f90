@@ -9,7 +9,7 @@
 !> have an estimate of their own. A right-hand side that cannot be evaluated ends an ERKStep run at once, without trying a shorter
 !> step.
 module rodyn_erk_integrator
-   use, intrinsic :: iso_c_binding, only: c_ptr, c_int, c_long, c_double, c_null_ptr, c_associated, c_loc, c_funloc
+   use, intrinsic :: iso_c_binding, only: c_ptr, c_int, c_long, c_double, c_null_ptr, c_associated, c_f_pointer, c_loc, c_funloc
    use rodyn_kinds, only: wp
    use rodyn_errors, only: error_type, raise
    use rodyn_text, only: time_text
@@ -18,12 +18,12 @@ module rodyn_erk_integrator
    use rodyn_quadrature_refinement, only: quadrature_refinement
    use rodyn_step_grid, only: step_grid
    use rodyn_erk_tableau, only: load_table, copy_with_errors, first_same_as_last, default_order
-   use rodyn_sundials_base, only: rhs_shim, weights_shim, quiet_handler, all_finite, check
+   use rodyn_sundials_base, only: callback_data, rhs_shim, weights_shim, all_finite, check
    use rodyn_sundials_integrator, only: sundials_integrator
-   use fsundials_nvector_mod, only: N_Vector
+   use rodyn_sundials_interface, only: N_Vector, silence_erkstep
    use farkode_mod, only: ARK_SUCCESS, ARK_ONE_STEP, FARKodeButcherTable_Free
    use farkode_erkstep_mod, only: FERKStepCreate, FERKStepReInit, FERKStepFree, FERKStepEvolve, FERKStepSetTable, &
-      FERKStepSetUserData, FERKStepWFtolerances, FERKStepSetErrHandlerFn, FERKStepSetMaxStep, FERKStepSetStopTime, &
+      FERKStepSetUserData, FERKStepWFtolerances, FERKStepSetMaxStep, FERKStepSetStopTime, &
       FERKStepSetFixedStep, FERKStepSetInterpolantDegree, FERKStepGetNumErrTestFails, FERKStepGetLastStep, &
       FERKStepSetPostprocessStepFn
    implicit none (type, external)
@@ -80,6 +80,8 @@ contains
 
       if (self%system%n_events > 0) call rates_now(self, error) ! for the first look into a step
       if (allocated(error)) return
+      self%data%next_rate = self%rate
+      self%data%next_awaited = .false.
       if (self%initialized) then ! the first step is chosen again
          call check(error, FERKStepReInit(self%memory, c_funloc(rhs_shim), t, self%state), 'ERKStepReInit', t)
          return
@@ -90,14 +92,14 @@ contains
          return
       end if
       associate (memory => self%memory)
-         call check(error, FERKStepSetErrHandlerFn(memory, c_funloc(quiet_handler), c_null_ptr), 'ERKStepSetErrHandlerFn')
+         call check(error, silence_erkstep(memory), 'ERKStepSetErrHandlerFn')
          call check(error, FERKStepSetUserData(memory, c_loc(self%data)), 'ERKStepSetUserData')
          call check(error, FERKStepWFtolerances(memory, c_funloc(weights_shim)), 'ERKStepWFtolerances')
          call check(error, FERKStepSetInterpolantDegree(memory, interpolant_degree), 'ERKStepSetInterpolantDegree')
          if (.not. allocated(error)) call choose_table(self, error)
          if (allocated(error)) return
          if (.not. first_same_as_last(self%a, self%b)) &
-            call check(error, FERKStepSetPostprocessStepFn(memory, c_funloc(nothing_to_do)), 'ERKStepSetPostprocessStepFn')
+            call check(error, FERKStepSetPostprocessStepFn(memory, c_funloc(note_step)), 'ERKStepSetPostprocessStepFn')
          if (self%options%max_step > 0.0_wp) &
             call check(error, FERKStepSetMaxStep(memory, self%options%max_step), 'ERKStepSetMaxStep')
       end associate
@@ -120,15 +122,20 @@ contains
       call FARKodeButcherTable_Free(address)
    end subroutine choose_table
 
-   !> ARKPostProcessFn that leaves the state alone.
-   function nothing_to_do(t, y, user_data) result(flag) bind(c)
+   !> ARKPostProcessFn that leaves the state alone. The next call of the right-hand side is at this new state: at once, or, by
+   !> newer versions of SUNDIALS, when the next step begins.
+   function note_step(t, y, user_data) result(flag) bind(c)
       real(c_double), intent(in), value :: t
       type(N_Vector), intent(in) :: y
       type(c_ptr), intent(in), value :: user_data
       integer(c_int) :: flag
-      associate (u1 => t, u2 => y, u3 => user_data); end associate
+      type(callback_data), pointer :: data
+      associate (u1 => t, u2 => y); end associate
+      call c_f_pointer(user_data, data)
+      data%last_stage = data%latest
+      data%next_awaited = .true.
       flag = 0_c_int
-   end function nothing_to_do
+   end function note_step
 
    subroutine set_library_stop(self, error)
       class(erk_integrator), intent(inout) :: self
@@ -160,24 +167,29 @@ contains
       if (self%system%n_events > 0) call self%look_for_event(error)
    end subroutine complete_step
 
-   !> Quadratures at the end of the last internal step, from the rates in its stages, which are those of the last calls.
+   !> Quadratures at the end of the last internal step, from the rates in its stages.
    subroutine add_quadratures(self)
       class(erk_integrator), intent(inout) :: self
-      integer :: i, j, n, back
+      integer :: i, j, n
+      logical :: same
 
       n = size(self%b)
-      back = merge(0, 1, first_same_as_last(self%a, self%b)) ! else a call at the new state follows the stages
+      same = first_same_as_last(self%a, self%b) ! then no step is noted: the last call is the last stage and at the new state
+      if (same) self%data%last_stage = self%data%latest
+      if (self%data%next_awaited) self%rate(:) = self%data%next_rate
       self%power(:, 1) = self%rate
       do j = 2, n
-         associate (call => modulo(self%data%latest - 1 - back - (n - j), n) + 1)
+         associate (call => modulo(self%data%last_stage - 1 - (n - j), n) + 1)
             do i = 1, n_quadratures
                self%power(i, j) = self%data%recent(i, call)
             end do
          end associate
       end do
-      do i = 1, n_quadratures
-         self%rate(i) = self%data%recent(i, self%data%latest)
-      end do
+      if (same) then
+         self%rate(:) = self%data%recent(:, self%data%latest)
+      else if (.not. self%data%next_awaited) then
+         self%rate(:) = self%data%next_rate
+      end if
       associate (first => self%system%n_controlled + 1)
          call integrate_quadratures(self, self%t_good, self%power, self%y_good(first:))
          call self%system%note_quadratures(self%y_good(first:), self%quadrature_error)

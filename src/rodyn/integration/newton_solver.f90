@@ -6,10 +6,8 @@ module rodyn_newton_solver
    use, intrinsic :: iso_c_binding, only: c_ptr, c_int, c_double, c_null_ptr, c_f_pointer, c_loc, c_funloc
    use rodyn_nvector, only: vector_content, content_of
    use rodyn_sundials_base, only: callback_data
-   use fsundials_nvector_mod, only: N_Vector
-   use fsundials_matrix_mod, only: SUNMatrix, SUNMatrix_Ops, SUNMATRIX_CUSTOM, FSUNMatNewEmpty
-   use fsundials_linearsolver_mod, only: SUNLinearSolver, SUNLinearSolver_Ops, SUNLINEARSOLVER_DIRECT, SUNLINEARSOLVER_CUSTOM, &
-      FSUNLinSolNewEmpty
+   use rodyn_sundials_interface, only: N_Vector, SUNMatrix, SUNMatrix_Ops, SUNMATRIX_CUSTOM, FSUNMatNewEmpty, &
+      SUNLinearSolver, SUNLinearSolver_Ops, SUNLINEARSOLVER_DIRECT, SUNLINEARSOLVER_CUSTOM, FSUNLinSolNewEmpty
    implicit none (type, external)
    private
    public :: new_newton_matrix, new_newton_solver, linear_system_shim

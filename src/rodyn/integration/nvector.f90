@@ -7,7 +7,7 @@
 module rodyn_nvector
    use, intrinsic :: iso_c_binding, only: c_ptr, c_int, c_int64_t, c_double, c_f_pointer, c_loc, c_funloc, c_null_ptr
    use rodyn_kinds, only: wp
-   use fsundials_nvector_mod, only: N_Vector, N_Vector_Ops, FN_VNewEmpty, FN_VFreeEmpty, FN_VCopyOps
+   use rodyn_sundials_interface, only: N_Vector, N_Vector_Ops, FN_VNewEmpty, FN_VFreeEmpty, FN_VCopyOps
    implicit none (type, external)
    private
    public :: new_nvector, free_nvector, vector_content, content_of

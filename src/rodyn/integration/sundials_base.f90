@@ -7,10 +7,10 @@ module rodyn_sundials_base
    use rodyn_text, only: time_text
    use rodyn_ode, only: ode_system, n_quadratures
    use rodyn_nvector, only: vector_content, content_of
-   use fsundials_nvector_mod, only: N_Vector
+   use rodyn_sundials_interface, only: N_Vector
    implicit none (type, external)
    private
-   public :: callback_data, rhs_shim, weights_shim, quiet_handler, all_finite, check, sundials_version
+   public :: callback_data, rhs_shim, weights_shim, all_finite, check, sundials_version
 
    !> What the callbacks find behind `user_data`.
    type :: callback_data
@@ -21,6 +21,9 @@ module rodyn_sundials_base
       real(wp), allocatable :: recent(:, :) !! rates of the quadratures in the last calls, in turn, if somebody wants them
                                             !! (n_quadratures, calls)
       integer :: latest = 0          !! column of the last call
+      integer :: last_stage = 0      !! column of the last stage of the last step, where it was noted
+      real(wp) :: next_rate(n_quadratures) = 0.0_wp !! rates of the quadratures in the first call after a noted step
+      logical :: next_awaited = .false. !! that call was not yet made
       logical :: refused = .false.   !! the last call said ok = .false.
       logical :: not_finite = .false. !! the last call gave NaN or infinity
       real(wp) :: t_refused = 0.0_wp !! time of the last bad call [s]
@@ -82,6 +85,8 @@ contains
          do i = 1, n_quadratures ! one by one: an array behind pointers would be copied through the heap
             data%recent(i, data%latest) = rates%values(data%system%n_controlled + i)
          end do
+         if (data%next_awaited) data%next_rate(:) = data%recent(:, data%latest)
+         data%next_awaited = .false.
       end if
       flag = 0_c_int
       if (ok) then
@@ -112,13 +117,6 @@ contains
       weights%values(states%n_controlled + 1:) = no_weight
       flag = 0_c_int
    end function weights_shim
-
-   !> CVErrHandlerFn and ARKErrHandlerFn that prints nothing: the return codes become messages of ours.
-   subroutine quiet_handler(code, module_name, function_name, message, handler_data) bind(c)
-      integer(c_int), intent(in), value :: code
-      type(c_ptr), intent(in), value :: module_name, function_name, message, handler_data
-      associate (u1 => code, u2 => module_name, u3 => function_name, u4 => message, u5 => handler_data); end associate
-   end subroutine quiet_handler
 
    !> True if no element is NaN or infinite. x - x is 0 for all others; a NaN would raise a trap in a comparison,
    !> so the exponent bits are looked at.

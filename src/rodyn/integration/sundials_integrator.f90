@@ -10,8 +10,7 @@ module rodyn_sundials_integrator
    use rodyn_event_search, only: find_event
    use rodyn_nvector, only: new_nvector, free_nvector, vector_content, content_of
    use rodyn_sundials_base, only: callback_data, all_finite, check
-   use fsundials_context_mod, only: FSUNContext_Create, FSUNContext_Free
-   use fsundials_nvector_mod, only: N_Vector
+   use rodyn_sundials_interface, only: new_context, FSUNContext_Free, N_Vector
    implicit none (type, external)
    private
    public :: sundials_integrator
@@ -96,7 +95,7 @@ contains
       self%data%rtol = inner%rtol
       self%data%atol = inner%atol
       allocate (self%y_before(n), source=0.0_wp)
-      call check(error, FSUNContext_Create(c_null_ptr, self%context), 'SUNContext_Create')
+      call check(error, new_context(self%context), 'SUNContext_Create')
       if (allocated(error)) return
       self%state => new_nvector(n, system%n_controlled, self%context)
       if (.not. associated(self%state)) call raise(error, 'N_VNewEmpty: out of memory')
