@@ -53,7 +53,7 @@ contains
       if (allocated(error)) error stop error%message
       config%model%formulation = merge('inextensible', 'consistent  ', index(kind, 'inextensible') > 0)
       if (kind == 'rhs_rigid' .or. kind == 'rhs_lumped') config%model%bending = 'rigid'
-      if (kind == 'rhs_quasistatic' .or. kind == 'rhs_condensed') config%model%bending = 'quasistatic'
+      if (kind == 'rhs_quasistatic' .or. index(kind, 'condensed') > 0) config%model%bending = 'quasistatic'
       if (kind == 'rhs_lumped' .or. kind == 'rhs_quasistatic') config%model%inertia = 'lumped'
       config%initial%phi = [0.1_wp, 0.2_wp, -0.1_wp, 0.3_wp]
       call new_scene(scene, config, error)

@@ -8,7 +8,7 @@ module rodyn_lane_recursion_condensed
    use rodyn_outboard_chain, only: lane_outward_size
    implicit none (type, external)
    private
-   public :: lane_condensed_accelerations
+   public :: lane_condensed_accelerations, outboard_inertia, add_rod
 
    ! Places in `outward` (`rodyn_outboard_chain`).
    integer, parameter :: of_z0 = 1, of_ae = 2, of_an = 3, of_t = 4, of_y = 5, of_fall = 6, of_cosine = 7, of_sine = 8
@@ -68,7 +68,8 @@ contains
          smallest = huge(1.0_wp)
          do k = n, 1, -1
             if (loaded) call load_node()
-            call add_rod()
+            call add_rod(rods(k), node_mass(:, k), omega, p(:, ip + k), moment(:, k - 1:k), moment_rate(:, k - 1:k), force(:, k), &
+                         sine(:, k - 1:k), cosine(:, k - 1:k), chain, outward(:, :, k), smallest)
          end do
       end subroutine inward_pass
 
@@ -80,123 +81,6 @@ contains
             chain%bn(i) = chain%bn(i) - (node_force(i, 2, k)*cosine(i, k) - node_force(i, 1, k)*sine(i, k))
          end do
       end subroutine load_node
-
-      !> All of rod k: what is outboard of its inner node, in the axes of rod k - 1 (of the spacecraft for k = 1).
-      subroutine add_rod()
-         real(wp) :: w, w2, fall, alpha, beta, alpha_rate, beta_rate, mv, mvv, curved_a, curved_b, pull_a, pull_b, mu
-         real(wp) :: turn, on_y, on_z, ew, nw, ww, wt, wx, et, ey, ez, nt, ny, nz, ay, ty, az, tz, zz, inv
-         real(wp) :: tau_t, tau_y, tau_z, y_y, y_z, z0, by_e, by_n, by_t, by_y, be, bn, bt, bx
-         real(wp) :: pee, pen, pnn, pet, pnt, ptt, pex, pnx, ptx, pxx, ee, en, nn, cd, sd
-
-         associate (r => rods(k))
-            !$omp simd
-            do i = 1, lanes
-               mu = node_mass(i, k)
-               pee = chain%ee(i) + mu
-               pen = chain%en(i)
-               pnn = chain%nn(i) + mu
-               pet = chain%et(i)
-               pnt = chain%nt(i)
-               ptt = chain%tt(i)
-               pex = chain%ex(i)
-               pnx = chain%nx(i)
-               ptx = chain%tx(i)
-               pxx = chain%xx(i)
-               w = omega(i) + p(i, ip + k)
-               w2 = w*w
-               fall = r%length(i)*w2
-               alpha = -(r%flexibility(i, 1)*moment(i, k - 1) + r%flexibility(i, 2)*moment(i, k))
-               beta = r%flexibility(i, 2)*moment(i, k - 1) + r%flexibility(i, 3)*moment(i, k)
-               alpha_rate = -(r%flexibility(i, 1)*moment_rate(i, k - 1) + r%flexibility(i, 2)*moment_rate(i, k))
-               beta_rate = r%flexibility(i, 2)*moment_rate(i, k - 1) + r%flexibility(i, 3)*moment_rate(i, k)
-               mv = r%first(i, 1)*alpha + r%first(i, 2)*beta
-               curved_a = r%second(i, 1)*alpha + r%second(i, 2)*beta
-               curved_b = r%second(i, 2)*alpha + r%second(i, 3)*beta
-               mvv = alpha*curved_a + beta*curved_b
-               pull_a = -w2*(r%inertia(i, 1)*alpha + r%inertia(i, 2)*beta)
-               pull_b = -w2*(r%inertia(i, 2)*alpha + r%inertia(i, 3)*beta)
-
-               ! Bias: forces at rest of A, t, y, z.
-               be = chain%be(i) - fall*pee
-               bn = chain%bn(i) - fall*pen
-               bt = chain%bt(i) - fall*pet
-               bx = chain%bx(i) - fall*pex
-               turn = 2.0_wp*w*(alpha_rate*curved_a + beta_rate*curved_b) + r%length(i)*bn
-               on_y = r%turn_y(i)*turn + r%out_y(i)*bt + (r%bend_y(i, 1)*pull_a + r%bend_y(i, 2)*pull_b)
-               on_z = r%turn_z(i)*turn + r%out_z(i)*bt + (r%bend_z(i, 1)*pull_a + r%bend_z(i, 2)*pull_b) + (bx + force(i, k))
-               bt = bt + turn
-               be = be - w2*r%m1(i) - 2.0_wp*w*(r%first(i, 1)*alpha_rate + r%first(i, 2)*beta_rate)
-               bn = bn - w2*mv
-
-               ! Inertia: rows of W' and t_out of the chain, spread over t, y, z.
-               ew = r%length(i)*pen - mv
-               nw = r%length(i)*pnn
-               ww = mvv + r%length(i)*nw
-               wt = r%length(i)*pnt
-               wx = r%length(i)*pnx
-               et = ew + pet
-               ey = ew*r%turn_y(i) + pet*r%out_y(i)
-               ez = ew*r%turn_z(i) + pet*r%out_z(i) + pex
-               nt = r%m1(i) + nw + pnt
-               ny = r%across_y(i) + nw*r%turn_y(i) + pnt*r%out_y(i)
-               nz = r%across_z(i) + nw*r%turn_z(i) + pnt*r%out_z(i) + pnx
-               ay = ww*r%turn_y(i) + wt*r%out_y(i)
-               ty = wt*r%turn_y(i) + ptt*r%out_y(i)
-               az = ww*r%turn_z(i) + wt*r%out_z(i) + wx
-               tz = wt*r%turn_z(i) + ptt*r%out_z(i) + ptx
-               tau_t = r%tt(i) + (ww + wt) + (wt + ptt)
-               tau_y = r%ty(i) + ay + ty
-               tau_z = r%tz(i) + az + tz
-               y_y = r%yy(i) + ay*r%turn_y(i) + ty*r%out_y(i)
-               y_z = r%yz(i) + az*r%turn_y(i) + tz*r%out_y(i)
-               zz = r%zz(i) + (az + wx)*r%turn_z(i) + (tz + ptx)*r%out_z(i) + pxx
-
-               ! Without z.
-               smallest(i) = min(smallest(i), zz)
-               inv = 1.0_wp/zz
-               z0 = -on_z*inv
-               by_e = ez*inv
-               by_n = nz*inv
-               by_t = tau_z*inv
-               by_y = y_z*inv
-               be = be + ez*z0
-               bn = bn + nz*z0
-               chain%bt(i) = bt + tau_z*z0
-               chain%bx(i) = on_y + y_z*z0
-               ee = r%m0(i) + pee - ez*by_e
-               en = pen - ez*by_n
-               nn = r%m0(i) + pnn - nz*by_n
-               pet = et - ez*by_t
-               pnt = nt - nz*by_t
-               chain%tt(i) = tau_t - tau_z*by_t
-               pex = ey - ez*by_y
-               pnx = ny - nz*by_y
-               chain%tx(i) = tau_y - tau_z*by_y
-               chain%xx(i) = y_y - y_z*by_y
-               cd = cosine(i, k)*cosine(i, k - 1) + sine(i, k)*sine(i, k - 1)
-               sd = sine(i, k)*cosine(i, k - 1) - cosine(i, k)*sine(i, k - 1)
-               outward(i, of_z0, k) = z0
-               outward(i, of_ae, k) = by_e
-               outward(i, of_an, k) = by_n
-               outward(i, of_t, k) = by_t
-               outward(i, of_y, k) = by_y
-               outward(i, of_fall, k) = fall
-               outward(i, of_cosine, k) = cd
-               outward(i, of_sine, k) = sd
-
-               ! `turn_axes`.
-               chain%ee(i) = cd*cd*ee + sd*(sd*nn - 2.0_wp*cd*en)
-               chain%nn(i) = cd*cd*nn + sd*(sd*ee + 2.0_wp*cd*en)
-               chain%en(i) = cd*sd*(ee - nn) + (cd - sd)*(cd + sd)*en
-               chain%et(i) = cd*pet - sd*pnt
-               chain%nt(i) = sd*pet + cd*pnt
-               chain%ex(i) = cd*pex - sd*pnx
-               chain%nx(i) = sd*pex + cd*pnx
-               chain%be(i) = cd*be - sd*bn
-               chain%bn(i) = sd*be + cd*bn
-            end do
-         end associate
-      end subroutine add_rod
 
       !> x_0, and the spacecraft under its loads and the chain.
       subroutine move_spacecraft()
@@ -286,5 +170,128 @@ contains
       end subroutine outward_pass
 
    end subroutine lane_condensed_accelerations
+
+   !> A rod with the chain beyond it: what is outboard of its inner node, in the axes of the rod further in (of the spacecraft).
+   !> (Public, so that it is not compiled into the loop over rods: there the compiler keeps an address for each of its arrays.)
+   pure subroutine add_rod(r, node_mass, omega, phi_rate, moment, moment_rate, force, sine, cosine, chain, outward, smallest)
+      type(lane_condensed_rod), intent(in) :: r
+      real(wp), dimension(lanes), intent(in) :: node_mass, omega, phi_rate, force !! of the outer node, w, phi', of the outer hinge
+      real(wp), dimension(lanes, 0:1), intent(in) :: moment, moment_rate !! of the hinges at both ends
+      real(wp), dimension(lanes, 0:1), intent(in) :: sine, cosine !! of phi of the rod further in, and of this one
+      type(outboard_inertia), intent(inout) :: chain
+      real(wp), intent(inout) :: outward(lanes, lane_outward_size), smallest(lanes)
+      real(wp) :: w, w2, fall, alpha, beta, alpha_rate, beta_rate, mv, mvv, curved_a, curved_b, pull_a, pull_b, mu
+      real(wp) :: turn, on_y, on_z, ew, nw, ww, wt, wx, et, ey, ez, nt, ny, nz, ay, ty, az, tz, zz, inv
+      real(wp) :: tau_t, tau_y, tau_z, y_y, y_z, z0, by_e, by_n, by_t, by_y, be, bn, bt, bx
+      real(wp) :: pee, pen, pnn, pet, pnt, ptt, pex, pnx, ptx, pxx, ee, en, nn, cd, sd
+      integer :: i
+
+      !$omp simd
+      do i = 1, lanes
+         mu = node_mass(i)
+         pee = chain%ee(i) + mu
+         pen = chain%en(i)
+         pnn = chain%nn(i) + mu
+         pet = chain%et(i)
+         pnt = chain%nt(i)
+         ptt = chain%tt(i)
+         pex = chain%ex(i)
+         pnx = chain%nx(i)
+         ptx = chain%tx(i)
+         pxx = chain%xx(i)
+         w = omega(i) + phi_rate(i)
+         w2 = w*w
+         fall = r%length(i)*w2
+         alpha = -(r%flexibility(i, 1)*moment(i, 0) + r%flexibility(i, 2)*moment(i, 1))
+         beta = r%flexibility(i, 2)*moment(i, 0) + r%flexibility(i, 3)*moment(i, 1)
+         alpha_rate = -(r%flexibility(i, 1)*moment_rate(i, 0) + r%flexibility(i, 2)*moment_rate(i, 1))
+         beta_rate = r%flexibility(i, 2)*moment_rate(i, 0) + r%flexibility(i, 3)*moment_rate(i, 1)
+         mv = r%first(i, 1)*alpha + r%first(i, 2)*beta
+         curved_a = r%second(i, 1)*alpha + r%second(i, 2)*beta
+         curved_b = r%second(i, 2)*alpha + r%second(i, 3)*beta
+         mvv = alpha*curved_a + beta*curved_b
+         pull_a = -w2*(r%inertia(i, 1)*alpha + r%inertia(i, 2)*beta)
+         pull_b = -w2*(r%inertia(i, 2)*alpha + r%inertia(i, 3)*beta)
+
+         ! Bias: forces at rest of A, t, y, z.
+         be = chain%be(i) - fall*pee
+         bn = chain%bn(i) - fall*pen
+         bt = chain%bt(i) - fall*pet
+         bx = chain%bx(i) - fall*pex
+         turn = 2.0_wp*w*(alpha_rate*curved_a + beta_rate*curved_b) + r%length(i)*bn
+         on_y = r%turn_y(i)*turn + r%out_y(i)*bt + (r%bend_y(i, 1)*pull_a + r%bend_y(i, 2)*pull_b)
+         on_z = r%turn_z(i)*turn + r%out_z(i)*bt + (r%bend_z(i, 1)*pull_a + r%bend_z(i, 2)*pull_b) + (bx + force(i))
+         bt = bt + turn
+         be = be - w2*r%m1(i) - 2.0_wp*w*(r%first(i, 1)*alpha_rate + r%first(i, 2)*beta_rate)
+         bn = bn - w2*mv
+
+         ! Inertia: rows of W' and t_out of the chain, spread over t, y, z.
+         ew = r%length(i)*pen - mv
+         nw = r%length(i)*pnn
+         ww = mvv + r%length(i)*nw
+         wt = r%length(i)*pnt
+         wx = r%length(i)*pnx
+         et = ew + pet
+         ey = ew*r%turn_y(i) + pet*r%out_y(i)
+         ez = ew*r%turn_z(i) + pet*r%out_z(i) + pex
+         nt = r%m1(i) + nw + pnt
+         ny = r%across_y(i) + nw*r%turn_y(i) + pnt*r%out_y(i)
+         nz = r%across_z(i) + nw*r%turn_z(i) + pnt*r%out_z(i) + pnx
+         ay = ww*r%turn_y(i) + wt*r%out_y(i)
+         ty = wt*r%turn_y(i) + ptt*r%out_y(i)
+         az = ww*r%turn_z(i) + wt*r%out_z(i) + wx
+         tz = wt*r%turn_z(i) + ptt*r%out_z(i) + ptx
+         tau_t = r%tt(i) + (ww + wt) + (wt + ptt)
+         tau_y = r%ty(i) + ay + ty
+         tau_z = r%tz(i) + az + tz
+         y_y = r%yy(i) + ay*r%turn_y(i) + ty*r%out_y(i)
+         y_z = r%yz(i) + az*r%turn_y(i) + tz*r%out_y(i)
+         zz = r%zz(i) + (az + wx)*r%turn_z(i) + (tz + ptx)*r%out_z(i) + pxx
+
+         ! Without z.
+         smallest(i) = min(smallest(i), zz)
+         inv = 1.0_wp/zz
+         z0 = -on_z*inv
+         by_e = ez*inv
+         by_n = nz*inv
+         by_t = tau_z*inv
+         by_y = y_z*inv
+         be = be + ez*z0
+         bn = bn + nz*z0
+         chain%bt(i) = bt + tau_z*z0
+         chain%bx(i) = on_y + y_z*z0
+         ee = r%m0(i) + pee - ez*by_e
+         en = pen - ez*by_n
+         nn = r%m0(i) + pnn - nz*by_n
+         pet = et - ez*by_t
+         pnt = nt - nz*by_t
+         chain%tt(i) = tau_t - tau_z*by_t
+         pex = ey - ez*by_y
+         pnx = ny - nz*by_y
+         chain%tx(i) = tau_y - tau_z*by_y
+         chain%xx(i) = y_y - y_z*by_y
+         cd = cosine(i, 1)*cosine(i, 0) + sine(i, 1)*sine(i, 0)
+         sd = sine(i, 1)*cosine(i, 0) - cosine(i, 1)*sine(i, 0)
+         outward(i, of_z0) = z0
+         outward(i, of_ae) = by_e
+         outward(i, of_an) = by_n
+         outward(i, of_t) = by_t
+         outward(i, of_y) = by_y
+         outward(i, of_fall) = fall
+         outward(i, of_cosine) = cd
+         outward(i, of_sine) = sd
+
+         ! `turn_axes`.
+         chain%ee(i) = cd*cd*ee + sd*(sd*nn - 2.0_wp*cd*en)
+         chain%nn(i) = cd*cd*nn + sd*(sd*ee + 2.0_wp*cd*en)
+         chain%en(i) = cd*sd*(ee - nn) + (cd - sd)*(cd + sd)*en
+         chain%et(i) = cd*pet - sd*pnt
+         chain%nt(i) = sd*pet + cd*pnt
+         chain%ex(i) = cd*pex - sd*pnx
+         chain%nx(i) = sd*pex + cd*pnx
+         chain%be(i) = cd*be - sd*bn
+         chain%bn(i) = sd*be + cd*bn
+      end do
+   end subroutine add_rod
 
 end module rodyn_lane_recursion_condensed

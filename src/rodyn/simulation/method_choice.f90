@@ -67,8 +67,9 @@ contains
          outputs = [(n_outputs*effort_of_output(candidates(i)%method, motion%dynamics), i=1, size(candidates))]
          expected = expected_efforts(motion%dynamics, options, rates, ratio, span, available)
          if (minval(expected + outputs(:n_even)) >= short_run) then
-            call fastest_rates(with_rigid_rods(scene), motion%dynamics%hinges, &
-                               y(:scene%n_base + scene%n + scene%n_q - scene%n_dof), rates%slow)
+            rates%slow = rates%frequency
+            if (scene%dynamic_bending) call fastest_rates(with_rigid_rods(scene), motion%dynamics%hinges, &
+                                                          y(:scene%n_base + scene%n + scene%n_q - scene%n_dof), rates%slow)
             if (rates%slow > 0.0_wp) ratio = max(rates%frequency, rates%decay)/rates%slow
             expected = expected_efforts(motion%dynamics, options, rates, ratio, span, available)
          end if
