@@ -176,17 +176,23 @@ contains
       if (config%model%formulation /= 'inextensible' .or. config%model%bending /= 'dynamic') return
       if (.not. all([(checker%is_sound('initial', 1, trim(keys(i))), i=1, 3), checker%is_sound('chain', 1, 'length')])) return
       associate (a => config%initial%alpha, b => config%initial%beta, c => config%initial%bubble, length => config%chain%length)
-         if (any([size(a), size(b), size(c)] /= size(length))) return
-         k = findloc(shortening(a, b, c/length) >= 1.0_wp, .true., 1)
+         if (any([size(a), size(b), size(c)] /= size(length)) .or. .not. all(length > 0.0_wp)) return ! another fault
+         k = findloc(shortening(a, b, c, length) >= 1.0_wp, .true., 1)
          if (k > 0) call checker%report('initial', 1, 'alpha', 'bends rod '//to_text(k)//' so much that int v''^2/2 ds, '// &
                                         'by which its chord is shorter than its arc, is more than its length')
       end associate
 
    contains
 
-      !> Over l, by the end slopes and bubble/l.
-      elemental real(wp) function shortening(a, b, c)
-         real(wp), intent(in) :: a, b, c
+      !> Over l. Slopes of any size may have been given: none counts for more than 1000 rad.
+      elemental real(wp) function shortening(alpha, beta, bubble, length)
+         real(wp), intent(in) :: alpha, beta, bubble, length
+         real(wp), parameter :: much = 1.0e3_wp
+         real(wp) :: a, b, c
+
+         a = sign(min(abs(alpha), much), alpha)
+         b = sign(min(abs(beta), much), beta)
+         c = bubble/max(length, abs(bubble)/much)
          shortening = (2.0_wp*(a**2 + b**2) - a*b)/30.0_wp + 8.0_wp/15.0_wp*(a - b)*c + 256.0_wp/105.0_wp*c**2
       end function shortening
 
