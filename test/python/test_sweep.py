@@ -193,7 +193,7 @@ def test_one_key_by_two_names_is_one_key(here):
 def test_an_axis_along_another_stays_with_it_in_a_grid(here):
     sweep(here, """&sweep base = 'base.nml' /
         &axis key = 'solver.rtol', values = 1e-5, 1e-7 /
-        &axis key = 'model.gauss_points', values = 3, 4, 5 /
+        &axis key = 'model.gauss_points', values = 4, 5, 6 /
         &axis key = 'solver.atol', values = 1e-7, 1e-9, along = 'solver.rtol' /""")
     data = opened(here)
     assert data.sizes["case"] == 6
