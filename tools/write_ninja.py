@@ -66,8 +66,8 @@ def main() -> None:
         needed += [str(path.parent / name) for name in INCLUDE.findall(text)]
         print(f"build {made}{' | ' * bool(offered)}{' '.join(offered)}: compile {path} | {' '.join(needed)}")
         print(f"  modules = {modules_of[folder]}")
-        less = "-O0" if folder == "test" else LESS.get(path.parts[:3], "")
-        print("  more =", less if "-O3" in flags else "", STAMPED.get(folder, ""))
+        less = "-O0" if folder == "test" else LESS.get(path.parts[:3], "") if "-O3" in flags else ""
+        print("  more =", less, STAMPED.get(folder, ""))
         if str(path) in PROGRAMS:
             parts = [made, *in_c] if folder == "app" else [made, f"{stage}/{ARCHIVES['test']}"]
             print(f"build {stage}/{PROGRAMS[str(path)]}: link {' '.join(parts)} {stage}/{ARCHIVES['src']}")
@@ -76,7 +76,6 @@ def main() -> None:
     shared = " ".join(f"{stage}/objects/{path.replace('/', '_')}.o" for path in SHARED)
     archive = f"{stage}/{ARCHIVES['src']}"
     print(f"build {stage}/lib/librodyn.so: share {shared} {archive} | app/shared.map")
-    print(f"  objects = {shared}\n  archive = {archive}")
     for folder, objects in members.items():
         print(f"build {stage}/{ARCHIVES[folder]}: archive {' '.join(objects)}")
 

@@ -2,16 +2,13 @@
 module rodyn_memory_run
    use rodyn_attributes, only: attribute_list
    use rodyn_case_config, only: case_config
-   use rodyn_case_notes, only: case_notes
-   use rodyn_case_reader, only: resolved_case
    use rodyn_driver, only: driver_type, new_driver
    use rodyn_errors, only: error_type, exit_stopped
    use rodyn_hinge_mechanism, only: kind_names
    use rodyn_integrator, only: monitor_type
-   use rodyn_integrators, only: sundials_version
    use rodyn_kinds, only: wp, i8
    use rodyn_motion, only: motion_type
-   use rodyn_notes, only: notes_on
+   use rodyn_origin, only: describe_origin
    use rodyn_quantities, only: chain_axes, entries, layout_of, row_layout
    use rodyn_recorder, only: recorder_type
    use rodyn_result_table, only: name_length, result_table
@@ -19,7 +16,7 @@ module rodyn_memory_run
    use rodyn_run_report, only: event_columns, provenance, solver_report
    use rodyn_run_setup, only: run_setup, new_run_setup
    use rodyn_simulation, only: even_times, simulate
-   use rodyn_text, only: joined, text_or_empty, to_text
+   use rodyn_text, only: to_text
    implicit none (type, external)
    private
    public :: run_in_memory
@@ -62,7 +59,8 @@ contains
       call new_driver(driver, setup%motion, setup%y, config%solver, config%t_end, config%n_outputs, error, monitor)
       if (allocated(error)) error%message = name//': '//error%message
       if (allocated(error)) return
-      call describe_case(origin, setup, config, input_text)
+      call describe_origin(config, setup%motion, setup%y, .true., origin)
+      origin%input = input_text
       call driver%make(error)
       if (allocated(error)) return
       call prepare_table(table, layout, config%n_outputs + 1, recorder%time)
@@ -74,23 +72,6 @@ contains
                           real(clock_end - clock_start, wp)/real(clock_rate, wp), error)
       call driver%finalize()
    end subroutine run_in_memory
-
-   !> What the result will be the result of.
-   subroutine describe_case(origin, setup, config, input_text)
-      type(provenance), intent(out) :: origin
-      type(run_setup), intent(in) :: setup
-      type(case_config), intent(in) :: config
-      character(len=*), intent(in) :: input_text
-
-      origin%title = text_or_empty(config%title)
-      origin%input = input_text
-      origin%resolved_input = resolved_case(config)
-      origin%sundials_version = sundials_version()
-      associate (scene => setup%motion%dynamics%scene, hinges => setup%motion%dynamics%hinges)
-         origin%notes = joined(case_notes(config, .true.), notes_on(scene, hinges, setup%y(:scene%n_dof), config%output%ledger), &
-                               new_line('a'))
-      end associate
-   end subroutine describe_case
 
    !> All arrays, with room for the rows.
    subroutine prepare_table(table, layout, n_rows, time)

@@ -116,8 +116,11 @@ contains
          associate (seen => self%rods(k), a => row%values(self%alpha + k), b => row%values(self%beta + k), &
                     ar => row%values(self%alpha_rate + k), br => row%values(self%beta_rate + k), &
                     w => row%values(self%omega + 1) + row%values(self%phi_rate + k))
-            deflection = greatest_deflection(a, b)
-            if (self%bubble >= 0) deflection = deflection_with_bubble(a, b, row%values(self%bubble + k)/seen%length)
+            if (self%bubble < 0) then
+               deflection = greatest_deflection(a, b)
+            else
+               deflection = deflection_with_bubble(a, b, row%values(self%bubble + k)/seen%length)
+            end if
             if (deflection > seen%deflection) then
                seen%deflection = deflection
                seen%t_deflection = row%time

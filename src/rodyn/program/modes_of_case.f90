@@ -1,22 +1,19 @@
 !> From a case to its modes, as a table in memory.
 module rodyn_modes_of_case
    use rodyn_case_config, only: case_config
-   use rodyn_case_notes, only: case_notes
-   use rodyn_case_reader, only: resolved_case
    use rodyn_errors, only: error_type
-   use rodyn_integrators, only: sundials_version
    use rodyn_kinds, only: wp
    use rodyn_linear_model, only: linear_model
    use rodyn_modes, only: mode_set
    use rodyn_modes_at_start, only: modes_at_start
    use rodyn_modes_table, only: tabulate_modes
-   use rodyn_notes, only: notes_on
+   use rodyn_origin, only: describe_origin
    use rodyn_quantities, only: layout_of
    use rodyn_result_table, only: result_table
    use rodyn_run_needs, only: check_memory, memory_of_scene, of_program
    use rodyn_run_report, only: provenance
    use rodyn_run_setup, only: run_setup, new_run_setup
-   use rodyn_text, only: joined, text_or_empty, to_text
+   use rodyn_text, only: to_text
    use rodyn_validity, only: validity_type, new_validity
    implicit none (type, external)
    private
@@ -41,11 +38,8 @@ contains
       if (.not. allocated(error)) call new_run_setup(setup, config, .false., error)
       if (.not. allocated(error)) call modes_at_start(setup%motion, config, equilibrium, loads, .true., model, modes, error)
       if (allocated(error)) return
-      origin%title = text_or_empty(config%title)
-      origin%resolved_input = resolved_case(config)
-      origin%sundials_version = sundials_version()
+      call describe_origin(config, setup%motion, model%q, .false., origin)
       associate (scene => setup%motion%dynamics%scene, hinges => setup%motion%dynamics%hinges)
-         origin%notes = joined(case_notes(config, .false.), notes_on(scene, hinges, model%q(:scene%n_dof), .false.), new_line('a'))
          validity = new_validity(scene, layout_of(config), 1, config%model%deflection_limit, config%model%axial_error_limit)
          call validity%judge_forces(setup%motion%dynamics, 0.0_wp, model%q, model%p, model%acceleration)
          warnings = validity%warnings()

@@ -2,15 +2,12 @@
 module rodyn_run
    use rodyn_kinds, only: wp, i8
    use rodyn_terminal, only: print_line
-   use rodyn_text, only: formatted, joined, text_or_empty, time_text, to_text, with_line_ends
+   use rodyn_text, only: formatted, time_text, to_text, with_line_ends
    use rodyn_errors, only: error_type, exit_stopped
    use rodyn_case_config, only: case_config
    use rodyn_case_check, only: sound_case
-   use rodyn_case_notes, only: case_notes
-   use rodyn_case_reader, only: resolved_case
    use rodyn_motion, only: motion_type
    use rodyn_integrator, only: solver_statistics
-   use rodyn_integrators, only: sundials_version
    use rodyn_lapack, only: use_one_thread
    use rodyn_driver, only: driver_type, new_driver
    use rodyn_recorder, only: recorder_type
@@ -22,7 +19,7 @@ module rodyn_run
    use rodyn_run_report, only: solver_report
    use rodyn_progress, only: progress_monitor, new_progress
    use rodyn_description, only: describe_scene
-   use rodyn_notes, only: notes_on
+   use rodyn_origin, only: describe_origin
    use rodyn_hinge_mechanism, only: kind_names
    use rodyn_user_load, only: user_load
    use rodyn_step_limit, only: check_fixed_step
@@ -58,7 +55,7 @@ contains
       type(driver_type) :: driver
       type(progress_monitor), target :: progress
       type(error_type), allocatable :: failure
-      character(len=:), allocatable :: notes
+      type(run_header) :: header
       logical :: silent, replace, earlier
       integer(i8) :: clock_start, clock_end, clock_rate
       real(wp) :: t, seconds
@@ -79,15 +76,14 @@ contains
       call new_driver(driver, setup%motion, setup%y, config%solver, config%t_end, config%n_outputs, error, progress)
       if (allocated(error) .and. present(name)) error%message = name//': '//error%message
       if (allocated(error)) return
-      associate (scene => setup%motion%dynamics%scene, hinges => setup%motion%dynamics%hinges)
-         notes = joined(case_notes(config, .true.), notes_on(scene, hinges, setup%y(:scene%n_dof), config%output%ledger), &
-                        new_line('a'))
-         if (.not. silent) call print_line(describe_scene(scene, config%output%ledger))
-      end associate
+      call describe_origin(config, setup%motion, setup%y, .true., header)
+      header%input = ''
+      if (present(input_text)) header%input = input_text
+      if (.not. silent) call print_line(describe_scene(setup%motion%dynamics%scene, config%output%ledger))
       if (.not. silent) call print_line('method  '//driver%methods()//': '//driver%reason())
-      if (.not. silent) call print_lines('note   ', notes)
+      if (.not. silent) call print_lines('note   ', header%notes)
       call driver%make(error)
-      if (.not. allocated(error)) call begin_file(recorder, setup%motion, config, path, replace, notes, error, input_text)
+      if (.not. allocated(error)) call begin_file(recorder, setup%motion, config, path, replace, header, error)
       if (allocated(error)) return
       call simulate(setup%motion, driver, even_times(config%t_end, config%n_outputs), config%t_end, recorder, setup%y, t, failure)
       call progress%finish()
@@ -118,23 +114,15 @@ contains
    end subroutine check_steps
 
    !> Create the file.
-   subroutine begin_file(recorder, motion, config, path, replace, notes, error, input_text)
+   subroutine begin_file(recorder, motion, config, path, replace, header, error)
       type(file_recorder), intent(inout) :: recorder
       type(motion_type), intent(in) :: motion
       type(case_config), intent(in) :: config
       character(len=*), intent(in) :: path
       logical, intent(in) :: replace
-      character(len=*), intent(in) :: notes
+      type(run_header), intent(inout) :: header !! what the file says of its origin; the rest is put in here
       type(error_type), allocatable, intent(out) :: error
-      character(len=*), intent(in), optional :: input_text
-      type(run_header) :: header
 
-      header%title = text_or_empty(config%title)
-      header%input = ''
-      if (present(input_text)) header%input = input_text
-      header%resolved_input = resolved_case(config)
-      header%notes = notes
-      header%sundials_version = sundials_version()
       header%layout = layout_of(config)
       header%n_rows = config%n_outputs + 1
       header%compression = config%output%compression
