@@ -233,18 +233,19 @@ contains
    !> One rod of 2 m turns with W: N = 1.5 W^2 (2.5^2 - 0.5^2)/2 = 4.5 W^2 at its root, P = N 4/(pi^2 50).
    subroutine limit_of_axial_force(error)
       type(error_type), allocatable, intent(out) :: error
+      character(len=*), parameter :: held = ' with held hinges between them (&hinge hinge = ..., held = .true.)'
       type(case_config) :: config
       character(len=:), allocatable :: found
 
       call expect('consistent', 0.0120_wp, '')
-      call expect('consistent', 0.0123_wp, 'divide it into 2 rods, or take formulation')
-      call expect('consistent', 1.2_wp, "divide it into 10 rods, or take formulation = 'inextensible' with dynamic bending, "// &
-                  'which needs 3')
+      call expect('consistent', 0.0123_wp, 'divide it into 2 rods'//held//', or take formulation')
+      call expect('consistent', 1.2_wp, 'divide it into 10 rods'//held// &
+                  ", or take formulation = 'inextensible' with dynamic bending, which needs 3")
       call expect('inextensible', 0.249_wp, '')
-      call expect('inextensible', 0.251_wp, 'divide it into 2 rods')
+      call expect('inextensible', 0.251_wp, 'divide it into 2 rods'//held)
       call expect('inextensible', 2.3_wp, &
                   'the axial force in rod 1 is 2.3 of its Euler load pi^2 EI/l^2 (280 N of tension at t = 0 s)')
-      call expect('inextensible', 2.3_wp, 'divide it into 4 rods')
+      call expect('inextensible', 2.3_wp, 'divide it into 4 rods'//held)
       if (allocated(error)) return
       config = spinning_chain(1, spin_for(100.0_wp), 'consistent')
       config%model%bending = 'rigid'

@@ -19,7 +19,8 @@ import benchmarks  # noqa: E402
 import run  # noqa: E402
 
 WARNING = re.compile(r"the axial force in rod (\d+) is (\S+) of its Euler load pi\^2 EI/l\^2 \((\S+) N of (\w+) at t = (\S+) s\); "
-                     r"above (\S+) bending .*; divide it into (\d+) rods"
+                     r"above (\S+) bending .*; divide it into (\d+) rods "
+                     r"with held hinges between them \(&hinge hinge = \.\.\., held = \.true\.\)"
                      r"(?:, or take formulation = 'inextensible' with dynamic bending(?:, which needs (\d+))?)?")
 
 

@@ -520,7 +520,8 @@ def test_one_more_rod_is_singular(tmp_path):
                + "&chain n_rods = 2, length = 1.5, mass_per_length = 1.7, bending_stiffness = 1e4, hinge_stiffness = 4000 /\n"
                + "&initial phi = 0.1 /\n")
     result = rodyn("run", "case.nml", cwd=tmp_path)
-    assert "divide it into two rods, and one more rod likewise\n" in result.stdout, result.stdout
+    advice = "divide it into two rods with held hinges between them (&hinge hinge = ..., held = .true.), and one more rod likewise\n"
+    assert advice in result.stdout, result.stdout
 
 
 def test_what_hardly_can_be_meant_is_noted(tmp_path):

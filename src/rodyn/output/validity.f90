@@ -25,6 +25,7 @@ module rodyn_validity
    private
    public :: validity_type, new_validity, interval_of_rows, greatest_deflection
 
+   character(len=*), parameter :: held = ' with held hinges between them (&hinge hinge = ..., held = .true.)'
    real(wp), parameter :: frequency_share = 0.5_wp !! of the rod's own first frequency
    real(wp), parameter :: energy_share = 0.01_wp   !! of the energy of the rod's turning and vibration
    integer, parameter :: fewest_rows = 20          !! mean squares of fewer tell nothing
@@ -292,7 +293,7 @@ contains
                 two_digits(abs(rod%tension))//' N of '//trim(merge('tension    ', 'compression', rod%tension > 0.0_wp))// &
                 ' at t = '//time_text(rod%t_tension)//' s); above '//two_digits(self%axial_limit)// &
                 ' bending may be off by more than axial_error_limit = '//two_digits(self%axial_error_limit)// &
-                ' of it; divide it into '//to_text(pieces(share, self%axial_limit))//' rods'
+                ' of it; divide it into '//to_text(pieces(share, self%axial_limit))//' rods'//held
          if (self%axial_limit_arc > 0.0_wp) text = text//', or '//with_arcs(pieces(share, self%axial_limit_arc))
       end associate
       associate (others => count(axial_share(self%rods) > self%axial_limit) - 1)
@@ -328,7 +329,7 @@ contains
 
       text = 'rod '//to_text(k)//' vibrates at '//two_digits(vibration(self%rods(k), self%n_seen))// &
              ' times its own first frequency ('//two_digits(self%rods(k)%own_frequency)// &
-             ' rad/s, which one rod overestimates by 11 %); divide it into two rods'
+             ' rad/s, which one rod overestimates by 11 %); divide it into two rods'//held
       associate (others => count(vibration(self%rods, self%n_seen) > frequency_share) - 1)
          if (others > 0) text = text//', and '//more_rods(others)//' likewise'
       end associate
