@@ -68,13 +68,15 @@ def draw_panel(axes: Axes, scene: BenchmarkScene, label: str, error: np.ndarray,
         if rows.size:
             fill = {"markerfacecolor": "white"} if scene.foreign[rows[0]] else {}
             axes.plot(error[rows], scene.seconds[rows], label=line, **style.mark_style(i) | fill)
-        for row in rows[[0, -1]] if rows.size and scene.rods.any() else []:
+        for row in {rows[0], rows[-1]} if rows.size and scene.rods.any() else ():
             axes.annotate(f"{scene.rods[row]:.0f}", (error[row], scene.seconds[row]), (4, -2), textcoords="offset points", fontsize=7,
                           color=style.line_style(i)["color"])
     lost = failed & np.isfinite(scene.seconds)
     if lost.any():
         axes.plot(np.full(lost.sum(), 0.98), scene.seconds[lost], transform=axes.get_yaxis_transform(), linestyle="none", marker="x",
                   markersize=7, markeredgewidth=1.8, color=style.FAILED, label="failed, or without error")
+    if scene.rods.any():
+        axes.margins(x=0.1)  # numbers stand beside the points
     axes.invert_xaxis()
     style.log_labels(axes.yaxis)
 
